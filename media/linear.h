@@ -1,0 +1,29 @@
+#pragma once
+
+#include "media/along_axis.h"
+
+namespace nullmark {
+
+/// f(s) = begin + (end - begin) s: linear up (begin < end) or down, 1/length.  With begin 0, end 1 one of the six profiles of
+/// Georgiev et al. 2019.
+struct LinearProfile {
+  static constexpr const char* kName = "linear";
+  static constexpr const char* kSummary = "extinction linear along an axis, up or down";
+  static constexpr const char* kSource = "Georgiev et al. 2019, canonical profiles";
+
+  Real begin = 0, end = 1;
+
+  void parameters(ParameterVisitor& visit) {
+    visit.number("begin", begin, Range::non_negative(), "1/length", "extinction at the lower face");
+    visit.number("end", end, Range::non_negative(), "1/length", "extinction at the upper face");
+  }
+
+  Real value(Real s) const { return begin + (end - begin) * s; }
+  Real integral(Real a, Real b) const { return (b - a) * value((a + b) / 2); }
+  std::pair<Real, Real> extrema(Real a, Real b) const { return std::minmax({value(a), value(b)}); }
+  int polynomial_degree() const { return 1; }
+};
+
+using Linear = AlongAxis<LinearProfile>;
+
+}  // namespace nullmark

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "media/medium.h"
+
+namespace nullmark {
+
+/// One stretch of a ray with bounds on the extinction inside it.
+struct Segment {
+  Real begin = 0;  ///< distance along the ray, length
+  Real end = 0;
+  Real majorant = 0;   ///< rate of tentative collisions, 1/length: the largest channel's bound times the looseness
+  Extrema extinction;  ///< per channel, without the looseness
+};
+
+/// What a majorant structure makes of a ray: contiguous segments from ray.begin to ray.end.
+struct SegmentBuffer {
+  std::vector<Segment> segments;
+  Real cell_diagonal = 0;  ///< of the structure's cell, world length (for the gamma rule of residual tracking)
+
+  void clear() { segments.clear(); }
+};
+
+/// Bounds over a medium: data, not a template axis.  Built once per medium and shared by all estimators and threads.
+class MajorantStructure {
+ public:
+  virtual ~MajorantStructure() = default;
+
+  /// Fills the buffer with the segments of a ray, given in the world and in the medium's local frame (same t, already cut to the
+  /// medium's bounds).  An empty interval gives no segment.
+  virtual void segments(const Ray& world, const Ray& local, SegmentBuffer& out) const = 0;
+};
+
+}  // namespace nullmark

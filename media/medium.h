@@ -1,0 +1,66 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "media/parameters.h"
+#include "media/types.h"
+
+namespace nullmark {
+
+/// n points in a medium's local frame, coordinate by coordinate.
+struct Points {
+  const Real* x = nullptr;
+  const Real* y = nullptr;
+  const Real* z = nullptr;
+  std::size_t size = 0;
+
+  Vec3 operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
+};
+
+/// Extinction over a box, per channel, in 1/length.  minimum <= mu <= maximum holds at every point of the box (true bounds, not
+/// estimates); the average may be approximate, since it serves as a control only.
+struct Extrema {
+  Spectrum minimum, average, maximum;
+
+  static Extrema grey(Real minimum, Real average, Real maximum) {
+    return {Spectrum::Constant(1, minimum), Spectrum::Constant(1, average), Spectrum::Constant(1, maximum)};
+  }
+};
+
+/// A field of extinction mu >= 0 in 1/length (world), with what bounds it.  Zero outside `bounds()`.  Everything is told in a
+/// local frame (unit cube, box, voxel indices), reached from the world by `world_to_local()`; distances t along rays stay world
+/// lengths. Immutable after construction, so one instance serves all threads.
+class Medium {
+ public:
+  virtual ~Medium() = default;
+
+  /// 1 to kMaxChannels.
+  virtual int channels() const { return 1; }
+
+  /// Local box outside which the extinction is zero.
+  virtual Box bounds() const = 0;
+
+  virtual Affine world_to_local() const { return Affine::Identity(); }
+
+  /// One lookup per point: out[i * channels() + c] = mu_c(points[i]).  Points lie inside `bounds()` up to rounding.
+  virtual void extinction(const Points& points, Real* out) const = 0;
+
+  /// Bounds and average over a local box (cut to `bounds()`; the vacuum outside is not counted).
+  virtual Extrema extrema(const Box& box) const = 0;
+
+  /// Appends distances t in (ray.begin, ray.end), in any order, at which the extinction along the local ray or one of its
+  /// derivatives jumps, and enough of them that between neighbours it is resolved by a 15-point rule.
+  virtual void knots(const Ray& /*ray*/, std::vector<Real>& /*t*/) const {}
+
+  /// Degree of the polynomial in t that the extinction follows between neighbouring knots, where it is one: exact traversal
+  /// (regular tracking) integrates it with degree/2 + 1 Gauss points.
+  virtual std::optional<int> polynomial_degree() const { return std::nullopt; }
+
+  /// Optical depth of the local ray over [begin, end] in closed form, per channel; nothing where there is none.
+  virtual std::optional<Spectrum> optical_depth(const Ray& /*ray*/) const { return std::nullopt; }
+};
+
+}  // namespace nullmark

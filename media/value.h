@@ -1,0 +1,51 @@
+#pragma once
+
+#include "media/types.h"
+
+namespace nullmark {
+
+// A `Value` is what one lookup returns: Real for a grey medium, Spectrum for a chromatic one.  The functions below let one source
+// serve both; a grey kernel holds no channel loop.
+
+template <class Value>
+Value uniform_value(int channels, Real x);
+template <>
+inline Real uniform_value<Real>(int, Real x) {
+  return x;
+}
+template <>
+inline Spectrum uniform_value<Spectrum>(int channels, Real x) {
+  return Spectrum::Constant(channels, x);
+}
+
+template <class Value>
+Value load(const Real* data, int channels);
+template <>
+inline Real load<Real>(const Real* data, int) {
+  return *data;
+}
+template <>
+inline Spectrum load<Spectrum>(const Real* data, int channels) {
+  return Eigen::Map<const Spectrum>(data, channels);
+}
+
+inline void store(Real value, Real* data) { *data = value; }
+inline void store(const Spectrum& value, Real* data) {
+  for (Eigen::Index c = 0; c < value.size(); ++c) data[c] = value[c];
+}
+
+inline Real largest(Real x) { return x; }
+inline Real largest(const Spectrum& x) { return x.maxCoeff(); }
+inline Real smallest(Real x) { return x; }
+inline Real smallest(const Spectrum& x) { return x.minCoeff(); }
+inline Real channel(Real x, int) { return x; }
+inline Real channel(const Spectrum& x, int c) { return x[c]; }
+inline Real& channel(Real& x, int) { return x; }
+inline Real& channel(Spectrum& x, int c) { return x[c]; }
+inline int channel_count(Real) { return 1; }
+inline int channel_count(const Spectrum& x) { return static_cast<int>(x.size()); }
+
+inline Real exponential(Real x) { return std::exp(x); }
+inline Spectrum exponential(const Spectrum& x) { return x.exp(); }
+
+}  // namespace nullmark
