@@ -14,14 +14,15 @@ using Real = double;
 /// Point or direction; lengths in world units unless a frame is named.
 using Vec3 = Eigen::Matrix<Real, 3, 1>;
 
-/// Affine map between the world and a medium's local frame.
-using Affine = Eigen::Transform<Real, 3, Eigen::AffineCompact>;
+/// Affine map between the world and a medium's local frame.  Like Spectrum without alignment demands, so that the layout does not
+/// depend on the instruction set a translation unit was compiled for.
+using Affine = Eigen::Transform<Real, 3, Eigen::AffineCompact | Eigen::DontAlign>;
 
 inline constexpr int kMaxChannels = 16;
 inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
 /// One number per channel: a run-time count within a fixed capacity, so that it never allocates.
-using Spectrum = Eigen::Array<Real, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxChannels, 1>;
+using Spectrum = Eigen::Array<Real, Eigen::Dynamic, 1, Eigen::ColMajor | Eigen::DontAlign, kMaxChannels, 1>;
 
 /// Axis-aligned box, lo <= hi in every component.
 struct Box {

@@ -1,0 +1,105 @@
+#pragma once
+
+#include "estimators/estimator.h"
+#include "estimators/survival.h"
+
+namespace nullmark {
+
+/// Delta tracking, 1 where the walk escapes [Woodcock et al. 1965; Coleman 1968].  Needs mub >= mu.  Binary, Var = T (1 - T), lookups
+/// int mub(x) T(0,x) dx.  On chromatic media the channels either share one walk at the largest channel's majorant, each comparing the
+/// same random number, until all are dead; or every channel walks for itself at its own majorant.
+template <class Value>
+struct DeltaTracking {
+  static constexpr const char* kName = "delta";
+  static constexpr const char* kSummary = "delta (Woodcock) tracking: 1 where the walk escapes, else 0";
+  static constexpr const char* kSource = "Woodcock et al. 1965; Coleman 1968";
+  static constexpr SampleRange kRange = SampleRange::binary;
+  static constexpr bool kNeedsBound = true;
+
+  std::string walks = "shared";
+
+  void parameters(ParameterVisitor& visit) {
+    visit.choice("walks", walks, {"shared", "separate"},
+                 "on chromatic media: one walk shared by the channels, or one walk per channel at its own majorant");
+  }
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Ray : Passage<Value> {
+    std::vector<Rates> per_channel;  ///< empty where the channels share one walk
+  };
+
+  void prepare(Ray& ray) const {
+    ray.per_channel.clear();
+    if (walks == "shared" || ray.channels == 1) return;
+    ray.per_channel.resize(static_cast<std::size_t>(ray.channels));
+    for (int c = 0; c < ray.channels; ++c) {
+      Rates& rates = ray.per_channel[static_cast<std::size_t>(c)];
+      rates.start(ray.begin);
+      for (const Segment& segment : ray.bounds.segments) {
+        const Real most = segment.extinction.maximum.maxCoeff();
+        rates.append(segment.end, most > 0 ? segment.majorant * (segment.extinction.maximum[c] / most) : segment.majorant);
+      }
+    }
+  }
+
+  struct Walk {
+    Value transmittance;
+    int walking = 0;  ///< the channel of a separate walk
+    bool done = false;
+  };
+
+  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+    walk = {ray.value(1), 0, false};
+    if (!ray.per_channel.empty()) flight.start(ray.per_channel[0]);
+  }
+
+  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+    if (ray.per_channel.empty()) return !walk.done && flight.next(rng);
+    while (walk.done || !flight.next(rng)) {
+      walk.done = false;
+      if (++walk.walking == ray.channels) return false;
+      flight.start(ray.per_channel[static_cast<std::size_t>(walk.walking)]);
+    }
+    return true;
+  }
+
+  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+    const Real threshold = rng.uniform() * at.rate();
+    if (!ray.per_channel.empty()) {
+      if (threshold < channel(extinction, walk.walking)) {
+        channel(walk.transmittance, walk.walking) = 0;
+        walk.done = true;
+      }
+      return;
+    }
+    bool alive = false;
+    for (int c = 0; c < ray.channels; ++c) {
+      if (threshold < channel(extinction, c)) channel(walk.transmittance, c) = 0;
+      alive = alive || channel(walk.transmittance, c) > 0;
+    }
+    walk.done = !alive;
+  }
+
+  Value result(const Walk& walk, const Ray&) const { return walk.transmittance; }
+
+  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+    const Real transmittance = std::exp(-profile.optical_depth(c));
+    Theory theory{.variance = transmittance * -std::expm1(-profile.optical_depth(c))};
+    if (ray.per_channel.empty()) {
+      theory.lookups = lookups_until_killed(
+          profile, [](int, const RayProfile::Node& at) { return at.extinction; },
+          [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); });
+    } else {
+      Real lookups = 0;
+      for (int k = 0; k < ray.channels; ++k)
+        lookups += profile.integrate(k, [&](const RayProfile::Node& at) {
+          return ray.per_channel[static_cast<std::size_t>(k)].rate(at.piece) * std::exp(-at.depth);
+        });
+      theory.lookups = lookups;
+    }
+    return theory;
+  }
+};
+
+}  // namespace nullmark

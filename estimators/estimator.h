@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimators/flight.h"
+#include "estimators/ray_profile.h"
+#include "media/majorants/majorant.h"
+#include "media/parameters.h"
+#include "media/value.h"
+
+namespace nullmark {
+
+/// What an estimator says of its mean.  `exact`: no variance, error of rounding only.  `unbiased`: mean T (or tau) for any sample count.
+/// `consistent`: bias vanishes with the step.  `biased`: neither; registered for comparison.
+enum class Claim { exact, unbiased, consistent, biased };
+
+/// Values one sample can take, when the majorant bounds the extinction.
+enum class SampleRange { binary, unit, non_negative, any_sign };
+
+enum class Quantity { transmittance, optical_depth };
+
+/// Exact moments of one sample, where known; lookups are their expectation.
+struct Theory {
+  std::optional<Real> mean;  ///< left out: the quantity itself
+  std::optional<Real> variance;
+  std::optional<Real> lookups;
+};
+
+/// One ray's way through the medium, as all walks of a block share it.
+template <class Value>
+struct Passage {
+  Real begin = 0, end = 0;  ///< world lengths
+  int channels = 1;
+  Rates majorant;                    ///< one piece per segment, the majorant of the largest channel
+  SegmentBuffer bounds;              ///< extrema per segment
+  Extrema medium;                    ///< over the whole medium
+  std::optional<Value> exact_depth;  ///< tau in closed form or by exact traversal; only for estimators with kNeedsOpticalDepth
+  std::vector<Real> knots;           ///< sorted, begin and end included; only for estimators with kNeedsKnots
+  std::optional<int> degree;         ///< of the extinction between knots
+  Vec3 entry = Vec3::Zero();         ///< world point at `begin`
+
+  Real length() const { return end - begin; }
+  Value value(Real x) const { return uniform_value<Value>(channels, x); }
+};
+
+// An estimator is a class template over Value with its parameters as fields and
+//
+//   static constexpr kName, kSummary, kSource     config name, one line, paper and equation
+//   static constexpr SampleRange kRange
+//   static constexpr bool kNeedsBound             false where any positive rate leaves it unbiased
+//   Claim claim(Quantity) const
+//   struct Walk                                   the state of one sample
+//   void init(Walk&, const Ray&, Flight&, auto& rng) const
+//   bool propose(Walk&, const Ray&, Flight&, auto& rng) const      true: "look up the extinction at flight.position()"
+//   void consume(Walk&, const Ray&, const Flight&, const Value& extinction, auto& rng) const
+//   Value result(const Walk&, const Ray&) const   the transmittance estimate
+//
+// and where it has them
+//
+//   void parameters(ParameterVisitor&)
+//   using Ray = ...; void prepare(Ray&) const     per-ray data of its own, derived from Passage<Value>; default Ray = Passage<Value>
+//   Value optical_depth(const Walk&, const Ray&) const             answers Quantity::optical_depth as well
+//   Value expected(const Value& tau, const Ray&) const             target other than exp(-tau), e.g. a factor of T
+//   Theory theory(const Ray&, const RayProfile&, int channel, Quantity) const
+//   void check(const Extrema& medium) const       throws ParameterError for parameters that do not fit the medium
+//
+// The loop, the counting, the majorant audit and the random streams are the harness's.
+
+}  // namespace nullmark

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "media/types.h"
+
+namespace nullmark {
+
+/// A piecewise constant sampling rate along a ray, 1/length, with its running depth int_begin^t rate.
+class Rates {
+ public:
+  void start(Real begin) {
+    pieces_.clear();
+    begin_ = begin;
+  }
+
+  /// Appends the piece from the current end to `end`.  Zero rates are fine, also over an infinite length.
+  void append(Real end, Real rate) {
+    const Real from = this->end(), before = total_depth();
+    pieces_.push_back({from, end, rate, before, rate > 0 ? before + rate * (end - from) : before});
+  }
+
+  std::size_t size() const { return pieces_.size(); }
+  Real begin() const { return begin_; }
+  Real end() const { return pieces_.empty() ? begin_ : pieces_.back().end; }
+  Real end(std::size_t i) const { return pieces_[i].end; }
+  Real rate(std::size_t i) const { return pieces_[i].rate; }
+  Real depth_before(std::size_t i) const { return pieces_[i].depth_before; }
+  Real depth_after(std::size_t i) const { return pieces_[i].depth_after; }
+  Real total_depth() const { return pieces_.empty() ? 0 : pieces_.back().depth_after; }
+
+  /// Distance at which the depth, within piece i, is reached.
+  Real position(std::size_t i, Real depth) const {
+    const Piece& piece = pieces_[i];
+    return std::min(piece.end, piece.begin + (depth - piece.depth_before) / piece.rate);
+  }
+
+ private:
+  struct Piece {
+    Real begin, end, rate, depth_before, depth_after;
+  };
+  std::vector<Piece> pieces_;
+  Real begin_ = 0;
+};
+
+/// Where a walk is on its ray.  Flights live in majorant depth: the next tentative collision lies one unit exponential of depth
+/// ahead, whatever cells are crossed, so a collision costs one logarithm and a crossing none.  That equals cutting the flight at each
+/// cell and starting anew, because the exponential has no memory [Yue et al. 2010, Sec. 3].  Cells of rate 0 are passed over.
+class Flight {
+ public:
+  void start(const Rates& rates) {
+    rates_ = &rates;
+    piece_ = 0;
+    depth_ = 0;
+    position_ = rates.begin();
+  }
+
+  /// Moves to the next tentative collision; false when it lies beyond the ray's end.
+  bool next(auto& rng) { return advance_to(depth_ + rng.exponential()); }
+
+  /// Moves forwards to the point of the given depth; false (and the ray's end) when the ray is not that deep.
+  bool advance_to(Real depth) {
+    depth_ = depth;
+    if (!(depth < rates_->total_depth())) {
+      position_ = rates_->end();
+      return false;
+    }
+    while (!(depth < rates_->depth_after(piece_))) ++piece_;
+    position_ = rates_->position(piece_, depth);
+    return true;
+  }
+
+  /// Puts the walk at a distance chosen by the estimator itself (marches).
+  void jump(Real position) { position_ = position; }
+
+  Real position() const { return position_; }
+  std::size_t piece() const { return piece_; }
+  /// Sampling rate mub at the position, 1/length.
+  Real rate() const { return rates_->rate(piece_); }
+  /// int rate from the ray's begin to the position, and from the position to the ray's end.
+  Real depth() const { return depth_; }
+  Real depth_left() const { return rates_->total_depth() - depth_; }
+
+ private:
+  const Rates* rates_ = nullptr;
+  std::size_t piece_ = 0;
+  Real depth_ = 0, position_ = 0;
+};
+
+}  // namespace nullmark

@@ -1,0 +1,42 @@
+#pragma once
+
+#include "estimators/estimator.h"
+
+namespace nullmark {
+
+/// Ratio tracking [Cramer 1978; Novák, Selle, Jarosz 2014, Alg. 1].  Unbiased for any rate mub > 0; in [0,1] where mub bounds the
+/// extinction, signed beyond.  Var = T^2 (exp(int mu^2/mub) - 1), lookups int mub.
+template <class Value>
+struct RatioTracking {
+  static constexpr const char* kName = "ratio";
+  static constexpr const char* kSummary = "ratio tracking: product of null-collision probabilities";
+  static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Alg. 1";
+  static constexpr SampleRange kRange = SampleRange::unit;
+  static constexpr bool kNeedsBound = false;
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Walk {
+    Value weight;
+  };
+
+  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk.weight = ray.value(1); }
+
+  bool propose(Walk&, const Passage<Value>&, Flight& flight, auto& rng) const { return flight.next(rng); }
+
+  void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto&) const {
+    walk.weight *= (at.rate() - extinction) / at.rate();
+  }
+
+  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+
+  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+    const Real transmittance = std::exp(-profile.optical_depth(c));
+    const Real spread = profile.integrate(c, [&](const RayProfile::Node& at) {
+      return at.extinction > 0 ? at.extinction * at.extinction / ray.majorant.rate(at.piece) : 0;
+    });
+    return {.variance = transmittance * transmittance * std::expm1(spread), .lookups = ray.majorant.total_depth()};
+  }
+};
+
+}  // namespace nullmark

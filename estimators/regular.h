@@ -1,0 +1,55 @@
+#pragma once
+
+#include "estimators/estimator.h"
+#include "estimators/gauss_points.h"
+
+namespace nullmark {
+
+/// Regular tracking: exact traversal from knot to knot [Amanatides and Woo 1987].  The extinction of the media that allow it is a polynomial
+/// of the distance between neighbouring knots; degree/2 + 1 Gauss points integrate it exactly (trilinear voxels: a cubic, two points), so
+/// only rounding is left.  Lookups = pieces * (degree/2 + 1).
+template <class Value>
+struct RegularTracking {
+  static constexpr const char* kName = "regular";
+  static constexpr const char* kSummary = "regular tracking: exact integration from knot to knot";
+  static constexpr const char* kSource = "Amanatides and Woo 1987; Gauss-Legendre";
+  static constexpr SampleRange kRange = SampleRange::unit;
+  static constexpr bool kNeedsBound = false;
+  static constexpr bool kNeedsKnots = true;
+
+  Claim claim(Quantity) const { return Claim::exact; }
+
+  struct Walk {
+    Value depth;
+    std::size_t piece = 0;
+    int point = -1;
+  };
+
+  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(0), 0, -1}; }
+
+  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto&) const {
+    if (++walk.point == gauss_count(*ray.degree)) {
+      walk.point = 0;
+      ++walk.piece;
+    }
+    if (walk.piece + 1 >= ray.knots.size()) return false;
+    const Real a = ray.knots[walk.piece], b = ray.knots[walk.piece + 1];
+    flight.jump(a + (b - a) * gauss_point(*ray.degree, walk.point));
+    return true;
+  }
+
+  void consume(Walk& walk, const Passage<Value>& ray, const Flight&, const Value& extinction, auto&) const {
+    const Real width = ray.knots[walk.piece + 1] - ray.knots[walk.piece];
+    walk.depth += extinction * (width * gauss_weight(*ray.degree, walk.point));
+  }
+
+  Value result(const Walk& walk, const Passage<Value>&) const { return exponential(Value(-walk.depth)); }
+  Value optical_depth(const Walk& walk, const Passage<Value>&) const { return walk.depth; }
+
+  Theory theory(const Passage<Value>& ray, const RayProfile&, int, Quantity) const {
+    const std::size_t pieces = ray.knots.size() < 2 ? 0 : ray.knots.size() - 1;
+    return {.variance = 0, .lookups = static_cast<Real>(pieces) * gauss_count(*ray.degree)};
+  }
+};
+
+}  // namespace nullmark

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "media/philox.h"
+#include "media/types.h"
+
+namespace nullmark {
+
+/// Where a sample's random stream comes from: results depend on nothing else, so threads, shards and resumed runs agree, and one
+/// sample can be replayed alone.
+struct SampleAddress {
+  std::uint64_t key = 0;  ///< from seed and medium (and the estimator, where common random numbers are not wanted)
+  std::uint32_t ray = 0;
+  std::uint64_t sample = 0;
+};
+
+/// xoroshiro128++ [Blackman and Vigna 2021], its state one Philox4x32-10 block of the address.  Counts its draws.
+class Rng {
+ public:
+  Rng() = default;
+  explicit Rng(const SampleAddress& at) {
+    const auto block = philox4x32(
+        {static_cast<std::uint32_t>(at.sample), static_cast<std::uint32_t>(at.sample >> 32), at.ray, 0},
+        {static_cast<std::uint32_t>(at.key), static_cast<std::uint32_t>(at.key >> 32)});
+    a_ = block[0] | std::uint64_t{block[1]} << 32;
+    b_ = block[2] | std::uint64_t{block[3]} << 32;
+    if ((a_ | b_) == 0) b_ = 1;  // the one state xoroshiro cannot leave
+  }
+
+  /// Multiple of 2^-53 in [0, 1).
+  Real uniform() {
+    ++draws_;
+    return static_cast<Real>(next() >> 11) * 0x1p-53;
+  }
+
+  /// Unit exponential -log(1 - u); 1 - u is exact, so u = 0 gives 0 and u = 1 - 2^-53 gives 36.7.
+  Real exponential() { return -std::log(1 - uniform()); }
+
+  std::uint64_t draws() const { return draws_; }
+
+ private:
+  std::uint64_t next() {
+    const std::uint64_t a = a_, result = std::rotl(a_ + b_, 17) + a_;
+    const std::uint64_t b = b_ ^ a;
+    a_ = std::rotl(a, 49) ^ b ^ (b << 21);
+    b_ = std::rotl(b, 28);
+    return result;
+  }
+
+  std::uint64_t a_ = 0, b_ = 1, draws_ = 0;
+};
+
+}  // namespace nullmark

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "estimators/estimator.h"
+#include "estimators/rng.h"
+
+namespace nullmark {
+
+/// One ray prepared for sampling: what the medium, the majorant structure and the references know of it.
+struct RayContext {
+  Ray world, local;  ///< cut to the medium
+  std::uint32_t index = 0;
+  SegmentBuffer segments;
+  std::vector<Real> knots;            ///< sorted, with begin and end; filled only when the kernel needs them
+  std::optional<Spectrum> exact_depth;  ///< filled only when the kernel needs it
+};
+
+/// Results of a block of samples of one ray.
+struct SampleBlock {
+  std::vector<Real> values;             ///< values[i * channels + c]
+  std::vector<std::uint32_t> lookups;   ///< per sample
+};
+
+/// Exact event counts; adding them is associative, so any order of merging gives the same totals.
+struct Counters {
+  std::uint64_t samples = 0, lookups = 0, null_collisions = 0, draws = 0, violations = 0, overruns = 0;
+  Real largest_violation = 0;  ///< max mu / mub beyond 1
+
+  Counters& operator+=(const Counters& other) {
+    samples += other.samples;
+    lookups += other.lookups;
+    null_collisions += other.null_collisions;
+    draws += other.draws;
+    violations += other.violations;
+    overruns += other.overruns;
+    largest_violation = std::max(largest_violation, other.largest_violation);
+    return *this;
+  }
+};
+
+/// Scratch memory of one thread.
+class Workspace {
+ public:
+  virtual ~Workspace() = default;
+};
+
+/// An estimator with its parameters, compiled for one kind of value.  Immutable; one instance serves all threads.
+class Kernel {
+ public:
+  virtual ~Kernel() = default;
+  virtual bool needs_optical_depth() const = 0;
+  virtual bool needs_knots() const = 0;
+  virtual std::unique_ptr<Workspace> workspace() const = 0;
+
+  /// Prepares a ray; the samples and theory of that ray follow.
+  virtual void begin_ray(Workspace&, const Medium&, const Extrema& medium, const RayContext&) const = 0;
+
+  /// Draws samples first .. first + count - 1 of the ray.
+  virtual void sample(Workspace&, const Medium&, const RayContext&, std::uint64_t key, std::uint64_t first, std::size_t count,
+                      Quantity, SampleBlock& out, Counters&) const = 0;
+
+  /// Mean of the estimator's target on this ray, given the exact optical depth: T = exp(-tau) or tau, unless it names another.
+  virtual Spectrum expected(const Workspace&, const Spectrum& optical_depth, Quantity) const = 0;
+
+  /// Exact moments per channel; empty where the estimator states none.
+  virtual std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const = 0;
+};
+
+/// An estimator's parameters before it meets a medium.
+class EstimatorSource {
+ public:
+  virtual ~EstimatorSource() = default;
+  virtual void parameters(ParameterVisitor& visit) = 0;
+  virtual Claim claim(Quantity) const = 0;
+  /// Throws ParameterError where the parameters do not fit the medium.
+  virtual void check(const Extrema& medium) const = 0;
+  virtual std::unique_ptr<const Kernel> kernel(int channels) const = 0;
+};
+
+}  // namespace nullmark

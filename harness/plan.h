@@ -1,0 +1,99 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "estimators/estimator.h"
+
+namespace nullmark {
+
+using ParameterValue = std::variant<Real, int, bool, std::string, std::vector<Real>, std::array<Real, 3>>;
+/// By parameter name, complete: defaults are filled in.
+using ParameterValues = std::map<std::string, ParameterValue>;
+
+/// A registered type with its parameters: an estimator, a medium's field, a majorant structure or a ray set.
+struct Component {
+  std::string type;
+  ParameterValues values;
+  std::string label;    ///< type and the parameters that differ from their defaults: "residual_ratio/control:average"
+  std::string pointer;  ///< JSON pointer in the configuration file, for messages
+
+  bool operator==(const Component& other) const { return type == other.type && values == other.values; }
+};
+
+/// A medium: one field, optionally times a spectrum; or one grey field per channel.
+struct MediumSpec {
+  Component field;                ///< type "channels" when `per_channel` is not empty
+  std::vector<Real> spectrum;     ///< empty: grey
+  std::vector<MediumSpec> per_channel;
+  bool optional = false;          ///< a missing data file skips the cells instead of failing the run
+  std::string label;
+
+  bool operator==(const MediumSpec& other) const {
+    return field == other.field && spectrum == other.spectrum && per_channel == other.per_channel;
+  }
+};
+
+/// What is done to every single sample (and to the reference) before it enters the statistics.
+struct Measurement {
+  bool clamp = false;          ///< to [0, 1]
+  int quantise_bits = 0;       ///< 0: none; n: round to the nearest multiple of 1/(2^n - 1)
+
+  bool operator==(const Measurement&) const = default;
+};
+
+/// One point of a sweep.  Indices refer to the plan's lists, in which equal specifications stand once.
+struct Cell {
+  std::string id;          ///< hash of everything that decides the statistics
+  std::string name;        ///< "estimator/medium/majorant", unique in the plan (experiment and seed are prefixed where needed)
+  std::string experiment;
+  Component estimator;
+  std::size_t medium = 0, majorant = 0, rays = 0;
+  Quantity quantity = Quantity::transmittance;
+  Measurement measurement;
+  std::uint64_t samples_per_ray = 1;
+  std::uint64_t seed = 1;
+  bool own_streams = false;  ///< streams keyed by the estimator too, instead of common random numbers
+  bool images = false;
+  Real image_maximum = 1;    ///< value shown white
+};
+
+/// How wall time is measured: one thread, repetitions interleaved at random over all cells.
+struct TimingPlan {
+  bool enabled = true;
+  int repetitions = 5;
+  Real seconds = 0.02;              ///< least time of one repetition
+  std::uint64_t samples_per_traversal = 64;  ///< samples that share one walk through the majorant structure
+};
+
+/// A row of a published table beside the cells that answer it.
+struct TableRow {
+  std::string label;
+  std::vector<std::pair<std::string, Real>> given;               ///< column heading, number from the source
+  std::vector<std::pair<std::string, std::string>> cells;        ///< column heading, cell name
+  std::optional<std::string> theory_of;                          ///< cell name whose theory column is shown
+  std::string note;                                              ///< e.g. "not reproduced"
+};
+struct Table {
+  std::string title, metric = "rmse";
+  std::vector<TableRow> rows;
+};
+
+/// A configuration, expanded: plain data.
+struct Plan {
+  std::string name;
+  std::vector<MediumSpec> media;
+  std::vector<Component> majorants;
+  std::vector<Component> ray_sets;
+  std::vector<Cell> cells;
+  TimingPlan timing;
+  std::vector<Table> tables;
+  std::string config_text;  ///< the configuration as applied, JSON
+};
+
+}  // namespace nullmark
