@@ -12,6 +12,7 @@ struct ClosedForm {
   static constexpr const char* kSource = "Beer-Lambert";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kIgnoresMajorant = true;
   static constexpr bool kNeedsOpticalDepth = true;
 
   Claim claim(Quantity) const { return Claim::exact; }

@@ -83,6 +83,13 @@ struct DeltaTracking {
 
   Value result(const Walk& walk, const Ray&) const { return walk.transmittance; }
 
+  int real_collisions(const Walk& walk, const Ray& ray) const {
+    if (ray.per_channel.empty()) return walk.done;
+    int dead = 0;
+    for (int c = 0; c < ray.channels; ++c) dead += channel(walk.transmittance, c) == 0;
+    return dead;
+  }
+
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
     const Real transmittance = std::exp(-profile.optical_depth(c));
     Theory theory{.variance = transmittance * -std::expm1(-profile.optical_depth(c))};

@@ -24,9 +24,9 @@ enum class Quantity { transmittance, optical_depth };
 
 /// Exact moments of one sample, where known; lookups are their expectation.
 struct Theory {
-  std::optional<Real> mean;  ///< left out: the quantity itself
-  std::optional<Real> variance;
-  std::optional<Real> lookups;
+  std::optional<Real> mean{};  ///< left out: the quantity itself
+  std::optional<Real> variance{};
+  std::optional<Real> lookups{};
 };
 
 /// One ray's way through the medium, as all walks of a block share it.
@@ -63,6 +63,9 @@ struct Passage {
 //   void parameters(ParameterVisitor&)
 //   using Ray = ...; void prepare(Ray&) const     per-ray data of its own, derived from Passage<Value>; default Ray = Passage<Value>
 //   Value optical_depth(const Walk&, const Ray&) const             answers Quantity::optical_depth as well
+//   int real_collisions(const Walk&, const Ray&) const             tentative collisions that ended a walk; default 0
+//   static constexpr bool kIgnoresMajorant                         lookups are no tentative collisions: neither audited nor counted as such
+//   static constexpr bool kNeedsOpticalDepth, kNeedsKnots          asks the harness to fill exact_depth, knots
 //   Value expected(const Value& tau, const Ray&) const             target other than exp(-tau), e.g. a factor of T
 //   Theory theory(const Ray&, const RayProfile&, int channel, Quantity) const
 //   void check(const Extrema& medium) const       throws ParameterError for parameters that do not fit the medium

@@ -1,15 +1,42 @@
 #pragma once
 
+#include <array>
+#include <boost/math/special_functions/legendre.hpp>
+#include <vector>
+
 #include "media/types.h"
 
 namespace nullmark {
 
-/// Gauss-Legendre on [0,1] with the fewest points exact for a polynomial of the degree: 1 up to linear, 2 up to cubic.
-inline int gauss_count(int degree) { return degree <= 1 ? 1 : 2; }
-inline Real gauss_point(int degree, int i) {
-  constexpr Real kOffset = 0.28867513459481288225;  // 1 / (2 sqrt 3)
-  return degree <= 1 ? 0.5 : i == 0 ? 0.5 - kOffset : 0.5 + kOffset;
+/// Gauss-Legendre rule on [0,1].
+struct GaussRule {
+  std::vector<Real> point, weight;
+
+  int size() const { return static_cast<int>(point.size()); }
+};
+
+/// The rule with the fewest points that is exact for a polynomial of the degree (up to kMostDegree): degree/2 + 1, so 1 up to linear and 2 up
+/// to cubic.
+inline constexpr int kMostDegree = 79;
+
+inline const GaussRule& gauss_rule(int degree) {
+  static const auto rules = [] {
+    std::array<GaussRule, kMostDegree / 2 + 1> all;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const int n = static_cast<int>(i) + 1;
+      const auto add = [&](Real x) {
+        const Real slope = boost::math::legendre_p_prime(n, x);
+        all[i].point.push_back((1 + x) / 2);
+        all[i].weight.push_back(1 / ((1 - x * x) * slope * slope));
+      };
+      for (const Real x : boost::math::legendre_p_zeros<Real>(n)) {
+        add(x);
+        if (x != 0) add(-x);
+      }
+    }
+    return all;
+  }();
+  return rules.at(static_cast<std::size_t>(degree / 2));
 }
-inline Real gauss_weight(int degree, int) { return degree <= 1 ? 1 : 0.5; }
 
 }  // namespace nullmark

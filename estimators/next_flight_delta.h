@@ -57,6 +57,8 @@ struct NextFlightDeltaTracking {
 
   Value result(const Walk& walk, const Ray&) const { return walk.sum; }
 
+  int real_collisions(const Walk& walk, const Ray&) const { return walk.done; }
+
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
     return {.variance = next_flight_variance(
                 ray.majorant, profile, c, [&](Real a) { return ray.weigh_all ? a * a : a; }, [](Real mu, Real) { return mu; }),

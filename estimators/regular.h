@@ -15,6 +15,7 @@ struct RegularTracking {
   static constexpr const char* kSource = "Amanatides and Woo 1987; Gauss-Legendre";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kIgnoresMajorant = true;
   static constexpr bool kNeedsKnots = true;
 
   Claim claim(Quantity) const { return Claim::exact; }
@@ -25,30 +26,35 @@ struct RegularTracking {
     int point = -1;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(0), 0, -1}; }
+  struct Ray : Passage<Value> {
+    const GaussRule* rule = nullptr;
+  };
+  void prepare(Ray& ray) const { ray.rule = &gauss_rule(*ray.degree); }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto&) const {
-    if (++walk.point == gauss_count(*ray.degree)) {
+  void init(Walk& walk, const Ray& ray, Flight&, auto&) const { walk = {ray.value(0), 0, -1}; }
+
+  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+    if (++walk.point == ray.rule->size()) {
       walk.point = 0;
       ++walk.piece;
     }
     if (walk.piece + 1 >= ray.knots.size()) return false;
     const Real a = ray.knots[walk.piece], b = ray.knots[walk.piece + 1];
-    flight.jump(a + (b - a) * gauss_point(*ray.degree, walk.point));
+    flight.jump(a + (b - a) * ray.rule->point[static_cast<std::size_t>(walk.point)]);
     return true;
   }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const Ray& ray, const Flight&, const Value& extinction, auto&) const {
     const Real width = ray.knots[walk.piece + 1] - ray.knots[walk.piece];
-    walk.depth += extinction * (width * gauss_weight(*ray.degree, walk.point));
+    walk.depth += extinction * (width * ray.rule->weight[static_cast<std::size_t>(walk.point)]);
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return exponential(Value(-walk.depth)); }
-  Value optical_depth(const Walk& walk, const Passage<Value>&) const { return walk.depth; }
+  Value result(const Walk& walk, const Ray&) const { return exponential(Value(-walk.depth)); }
+  Value optical_depth(const Walk& walk, const Ray&) const { return walk.depth; }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile&, int, Quantity) const {
+  Theory theory(const Ray& ray, const RayProfile&, int, Quantity) const {
     const std::size_t pieces = ray.knots.size() < 2 ? 0 : ray.knots.size() - 1;
-    return {.variance = 0, .lookups = static_cast<Real>(pieces) * gauss_count(*ray.degree)};
+    return {.variance = 0, .lookups = static_cast<Real>(pieces) * ray.rule->size()};
   }
 };
 

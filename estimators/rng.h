@@ -21,7 +21,7 @@ struct SampleAddress {
 class Rng {
  public:
   Rng() = default;
-  explicit Rng(const SampleAddress& at) {
+  explicit Rng(const SampleAddress& at) : sample_(at.sample) {
     const auto block = philox4x32(
         {static_cast<std::uint32_t>(at.sample), static_cast<std::uint32_t>(at.sample >> 32), at.ray, 0},
         {static_cast<std::uint32_t>(at.key), static_cast<std::uint32_t>(at.key >> 32)});
@@ -41,6 +41,9 @@ class Rng {
 
   std::uint64_t draws() const { return draws_; }
 
+  /// Index of the sample this stream belongs to.
+  std::uint64_t sample() const { return sample_; }
+
  private:
   std::uint64_t next() {
     const std::uint64_t a = a_, result = std::rotl(a_ + b_, 17) + a_;
@@ -50,7 +53,7 @@ class Rng {
     return result;
   }
 
-  std::uint64_t a_ = 0, b_ = 1, draws_ = 0;
+  std::uint64_t a_ = 0, b_ = 1, draws_ = 0, sample_ = 0;
 };
 
 }  // namespace nullmark

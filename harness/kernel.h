@@ -54,6 +54,8 @@ class Kernel {
   virtual ~Kernel() = default;
   virtual bool needs_optical_depth() const = 0;
   virtual bool needs_knots() const = 0;
+  virtual bool states_theory() const = 0;
+  virtual bool answers(Quantity) const = 0;
   virtual std::unique_ptr<Workspace> workspace() const = 0;
 
   /// Prepares a ray; the samples and theory of that ray follow.

@@ -57,6 +57,7 @@ struct Cell {
   Quantity quantity = Quantity::transmittance;
   Measurement measurement;
   std::uint64_t samples_per_ray = 1;
+  std::optional<Real> equal_lookups{};  ///< lookups per ray: samples_per_ray becomes this over the expected lookups per sample
   std::uint64_t seed = 1;
   bool own_streams = false;  ///< streams keyed by the estimator too, instead of common random numbers
   bool images = false;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "estimators/estimator.h"
-#include "harness/kernel.h"
+#include "harness/block_kernel.h"
 #include "media/registry.h"
 
 namespace nullmark {
@@ -18,6 +18,20 @@ struct EstimatorEntry {
   bool answers_optical_depth = false;
   std::unique_ptr<EstimatorSource> (*make)() = nullptr;
 };
+
+template <template <class> class Estimator>
+EstimatorEntry estimator_entry() {
+  using E = Estimator<Real>;
+  return {.name = E::kName,
+          .summary = E::kSummary,
+          .source = E::kSource,
+          .range = E::kRange,
+          .needs_bound = E::kNeedsBound,
+          .answers_optical_depth = requires(const E& e, typename E::Walk w, typename detail::RayOf<E, Real>::type r) {
+            e.optical_depth(w, r);
+          },
+          .make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<EstimatorTemplate<Estimator>>(); }};
+}
 
 }  // namespace nullmark
 

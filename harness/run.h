@@ -24,6 +24,7 @@ struct RunOptions {
 struct RunObserver {
   std::function<void(const CellRecord&, std::size_t done, std::size_t total)> cell_done = [](const CellRecord&, std::size_t, std::size_t) {};
   std::function<void(const CellRecord&, double fraction)> progress = [](const CellRecord&, double) {};
+  std::function<void(double fraction)> timing = [](double) {};
   std::function<void(const CellRecord&)> cell_timed = [](const CellRecord&) {};
   std::function<void(const std::string&)> warning = [](const std::string&) {};
 };
@@ -35,7 +36,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
 
 /// What a run would do, without sampling: per selected cell the predicted lookups per sample (from theory) where known.
 struct Prediction {
-  std::uint64_t rays = 0;
+  std::uint64_t rays = 0, samples_per_ray = 0;
   std::optional<double> lookups_per_sample, relative_variance;
   std::string status;  ///< "ok" or the reason why it would be skipped
 };

@@ -7,12 +7,25 @@
 
 namespace nullmark {
 
+/// int_a^b f ds by the 15-point Gauss rule: exact to rounding where f is smooth over [a, b].
+template <class Function>
+Real integral_by_rule(const Function& f, Real a, Real b) {
+  return (b - a) * boost::math::quadrature::gauss<Real, 15>::integrate([&](Real u) { return f(a + u * (b - a)); }, 0., 1.);
+}
+
+/// Bounds from values at the ends of a monotone stretch, a few ulps further apart: exp, log and cos as computed are monotone to
+/// rounding only, and the bounds must hold for the values as computed.
+inline std::pair<Real, Real> outward(std::pair<Real, Real> bounds) {
+  constexpr Real kRounding = 4 * std::numeric_limits<Real>::epsilon();
+  return {bounds.first * (1 - kRounding), bounds.second * (1 + kRounding)};
+}
+
 /// A grey medium mu(p) = scale * f(s) that varies along one axis of a box, s = (p[axis] - lo) / (hi - lo) in [0,1].
 ///
-/// `Profile` has `Real value(Real s)` = f(s) >= 0 and `Real integral(Real a, Real b)` = int_a^b f ds in closed form,
-/// `std::pair<Real, Real> extrema(Real a, Real b)`, and where they exist `void knots(std::vector<Real>& s)`, `int
-/// polynomial_degree()`, `prepare()`. With `optical_depth` tau > 0, scale = tau / (int_0^1 f ds * (hi - lo)): the axis then has
-/// the transmittance e^-tau whatever the profile's own amplitude; otherwise scale = 1.
+/// `Profile` has `Real value(Real s)` = f(s) >= 0, `Real integral(Real a, Real b)` = int_a^b f ds for a < b in closed form and
+/// relatively accurate however close a and b are, `std::pair<Real, Real> extrema(Real a, Real b)`, and where they exist `void
+/// knots(std::vector<Real>& s)`, `int polynomial_degree()`, `prepare()`. With `optical_depth` tau > 0, scale = tau / (int_0^1 f
+/// ds * (hi - lo)): the axis then has the transmittance e^-tau whatever the profile's own amplitude; otherwise scale = 1.
 template <class Profile>
 struct AlongAxis {
   static constexpr const char* kName = Profile::kName;
@@ -58,20 +71,15 @@ struct AlongAxis {
   Extrema extrema(const Box& box) const {
     const Real a = coordinate(box.lo[axis]), b = coordinate(box.hi[axis]);
     const auto [minimum, maximum] = profile.extrema(a, b);
-    const Real average = b > a ? profile.integral(a, b) / (b - a) : profile.value(a);
+    const Real average = b > a ? std::clamp(profile.integral(a, b) / (b - a), minimum, maximum) : profile.value(a);
     return Extrema::grey(scale * minimum, scale * average, scale * maximum);
   }
 
   void knots(const Ray& ray, std::vector<Real>& t) const {
-    if constexpr (requires { profile.knots(t); }) {
+    if constexpr (requires(std::vector<Real> s) { profile.knots(s); }) {
       std::vector<Real> s;
       profile.knots(s);
-      const Real d = ray.direction[axis];
-      if (d == 0) return;
-      for (const Real knot : s) {
-        const Real at = (lo[axis] + knot * (hi[axis] - lo[axis]) - ray.origin[axis]) / d;
-        if (at > ray.begin && at < ray.end) t.push_back(at);
-      }
+      for (const Real knot : s) append_crossing(ray, axis, lo[axis] + knot * (hi[axis] - lo[axis]), t);
     }
   }
 
@@ -79,26 +87,25 @@ struct AlongAxis {
   { return profile.polynomial_degree(); }
 
   std::optional<Real> optical_depth(const Ray& ray) const {
-    const Real a = coordinate(ray.at(ray.begin)[axis]), b = coordinate(ray.at(ray.end)[axis]);
     if (!(ray.length() > 0)) return 0;
-    // The antiderivative's difference cancels on rays nearly perpendicular to the axis; there the profile is smooth over [a, b].
-    constexpr Real kShort = 1e-3;
-    if (a == b) return scale * profile.value(a) * ray.length();
-    if (std::abs(b - a) < kShort && !crosses_knot(a, b)) {
-      using Rule = boost::math::quadrature::gauss<Real, 15>;
-      return scale * ray.length() * Rule::integrate([&](Real u) { return profile.value(a + u * (b - a)); }, 0., 1.);
-    }
-    return scale * ray.length() * profile.integral(std::min(a, b), std::max(a, b)) / std::abs(b - a);
+    if constexpr (requires { profile.polynomial_degree(); })
+      if (profile.polynomial_degree() == 0) return sum_of_constant_pieces(ray);
+    // The mean over [a, b], not a difference of antiderivatives: on rays nearly perpendicular to the axis b - a has lost most of
+    // its digits, but the mean hardly depends on it.
+    const Real a = coordinate(ray.at(ray.begin)[axis]), b = coordinate(ray.at(ray.end)[axis]);
+    const Real mean = a == b ? profile.value(a) : profile.integral(std::min(a, b), std::max(a, b)) / std::abs(b - a);
+    return scale * mean * ray.length();
   }
 
  private:
-  bool crosses_knot(Real a, Real b) const {
-    if constexpr (requires(std::vector<Real> & s) { profile.knots(s); }) {
-      std::vector<Real> s;
-      profile.knots(s);
-      return std::any_of(s.begin(), s.end(), [&](Real k) { return k >= std::min(a, b) && k <= std::max(a, b); });
-    }
-    return false;
+  // A mean does depend on b - a where f jumps between them; lengths from knot to knot do not.
+  Real sum_of_constant_pieces(const Ray& ray) const {
+    std::vector<Real> t = {ray.begin, ray.end};
+    knots(ray, t);
+    std::sort(t.begin(), t.end());
+    Real sum = 0;
+    for (std::size_t i = 1; i < t.size(); ++i) sum += extinction(ray.at((t[i - 1] + t[i]) / 2)) * (t[i] - t[i - 1]);
+    return sum;
   }
 };
 

@@ -8,6 +8,23 @@
 
 namespace nullmark {
 
+/// Appends the t in (ray.begin, ray.end) at which the ray crosses the plane p[axis] = x, if it does.
+inline void append_crossing(const Ray& ray, int axis, Real x, std::vector<Real>& t) {
+  const Real d = ray.direction[axis];
+  if (d == 0) return;
+  const Real at = (x - ray.origin[axis]) / d;
+  if (at > ray.begin && at < ray.end) t.push_back(at);
+}
+
+/// The same for the n - 1 planes that cut [lo, hi] into n equal cells.
+inline void append_planes(const Ray& ray, int axis, Real lo, Real hi, int n, std::vector<Real>& t) {
+  if (ray.direction[axis] == 0) return;
+  const auto lattice = [&](Real at) { return std::clamp<Real>((ray.at(at)[axis] - lo) / (hi - lo) * n, 0, n); };
+  const auto [a, b] = std::minmax({lattice(ray.begin), lattice(ray.end)});
+  const int first = std::max(1, static_cast<int>(a)), last = std::min(n - 1, static_cast<int>(b) + 1);
+  for (int i = first; i <= last; ++i) append_crossing(ray, axis, lo + (hi - lo) * i / n, t);
+}
+
 /// A grey medium from a plain struct: the author writes `Real extinction(const Vec3&) const`, `Extrema extrema(const Box&)
 /// const`, `Box bounds() const`, and where they exist `void knots(const Ray&, std::vector<Real>&) const`, `int
 /// polynomial_degree() const`, `std::optional<Real> optical_depth(const Ray&) const`; this adaptor makes the block loop with the
@@ -25,7 +42,9 @@ class FieldMedium final : public Medium {
 
   Extrema extrema(const Box& box) const override {
     const Box whole = field_.bounds();
-    return field_.extrema({box.lo.cwiseMax(whole.lo), box.hi.cwiseMin(whole.hi)});
+    const Box part = {box.lo.cwiseMax(whole.lo), box.hi.cwiseMin(whole.hi)};
+    if ((part.lo.array() > part.hi.array()).any()) return Extrema::grey(0, 0, 0);
+    return field_.extrema(part);
   }
 
   void knots(const Ray& ray, std::vector<Real>& t) const override {
@@ -41,7 +60,9 @@ class FieldMedium final : public Medium {
 
   std::optional<Spectrum> optical_depth(const Ray& ray) const override {
     if constexpr (requires { field_.optical_depth(ray); }) {
-      if (const std::optional<Real> depth = field_.optical_depth(ray)) return Spectrum::Constant(1, *depth);
+      // Fields extend their faces' values beyond the box; outside there is vacuum.
+      if (const std::optional<Real> depth = field_.optical_depth(clipped(ray, field_.bounds())))
+        return Spectrum::Constant(1, *depth);
     }
     return std::nullopt;
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -58,6 +59,9 @@ class Medium {
   /// Degree of the polynomial in t that the extinction follows between neighbouring knots, where it is one: exact traversal
   /// (regular tracking) integrates it with degree/2 + 1 Gauss points.
   virtual std::optional<int> polynomial_degree() const { return std::nullopt; }
+
+  /// Digest of data that the parameters do not tell, such as the voxels of a file; 0 where there are none.
+  virtual std::uint64_t content_hash() const { return 0; }
 
   /// Optical depth of the local ray over [begin, end] in closed form, per channel; nothing where there is none.
   virtual std::optional<Spectrum> optical_depth(const Ray& /*ray*/) const { return std::nullopt; }

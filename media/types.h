@@ -16,7 +16,7 @@ using Vec3 = Eigen::Matrix<Real, 3, 1>;
 
 /// Affine map between the world and a medium's local frame.  Like Spectrum without alignment demands, so that the layout does not
 /// depend on the instruction set a translation unit was compiled for.
-using Affine = Eigen::Transform<Real, 3, Eigen::AffineCompact | Eigen::DontAlign>;
+using Affine = Eigen::Transform<Real, 3, Eigen::AffineCompact, Eigen::DontAlign>;
 
 inline constexpr int kMaxChannels = 16;
 inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();

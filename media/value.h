@@ -38,7 +38,7 @@ inline Real largest(Real x) { return x; }
 inline Real largest(const Spectrum& x) { return x.maxCoeff(); }
 inline Real smallest(Real x) { return x; }
 inline Real smallest(const Spectrum& x) { return x.minCoeff(); }
-inline Real channel(Real x, int) { return x; }
+inline Real channel(const Real& x, int) { return x; }
 inline Real channel(const Spectrum& x, int c) { return x[c]; }
 inline Real& channel(Real& x, int) { return x; }
 inline Real& channel(Spectrum& x, int c) { return x[c]; }

@@ -1,0 +1,120 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimators/estimator.h"
+
+namespace nullmark {
+
+/// The control extinction mu_c(t) of residual tracking along a ray, with tau_c in closed form and the rate that goes with it.
+///
+///   minimum, average, middle, maximum   of the segment's bounds (one segment: of the medium; a grid: of each super-voxel)
+///   medium_average                      over the whole medium
+///   ray_average                         tau/d, from the medium's own closed form or exact traversal
+///   gamma                               min + mubr (gamma^{1/(D mubr)} - 1), cut to [min, average], with mubr = max(max - min, floor) and D
+///                                       the super-voxel's diagonal [Novák et al. 2014, Sec. 5.1; derived from its purpose]
+///   given                               `value`
+///   linear, exponential                 from `value` at the ray's begin to `value_end` at its end
+struct ControlChoice {
+  std::string kind = "minimum";
+  Real value = 0, value_end = 0, gamma = 2;
+  std::string rate = "deviation";
+  Real rate_scale = 1;
+
+  static constexpr Real kGammaRateFloor = 0.1;
+
+  void rate_parameters(ParameterVisitor& visit) {
+    visit.choice("rate", rate, {"deviation", "majorant"},
+                 "residual rate mubr: max |mu - mu_c| from the segment's bounds, or the segment's majorant");
+    visit.number("rate_scale", rate_scale, Range::positive(), "", "factor on the residual rate");
+  }
+
+  void parameters(ParameterVisitor& visit) {
+    visit.choice("control", kind,
+                 {"minimum", "average", "middle", "maximum", "medium_average", "ray_average", "gamma", "given", "linear", "exponential"},
+                 "control extinction: of the segment's bounds, of the medium or the ray, by the gamma rule, or given");
+    visit.number("value", value, Range::non_negative(), "1/length", "control extinction (given), or at the ray's begin (linear, exponential)");
+    visit.number("value_end", value_end, Range::non_negative(), "1/length", "control extinction at the ray's end (linear, exponential)");
+    visit.number("gamma", gamma, {1, 1e6, true}, "", "bound of the residual estimate at the expected number of collisions (gamma)");
+    rate_parameters(visit);
+  }
+
+  bool is_profile() const { return kind == "linear" || kind == "exponential"; }
+};
+
+/// The control as one ray sees it.
+template <class Value>
+struct Control {
+  std::vector<Value> of_segment;  ///< constant in each segment; unused for profiles
+  bool linear = false, exponential_profile = false;
+  Real begin = 0, length = 0, first = 0, growth = 0;  ///< profile: first + growth s, or first e^{growth s}, s = (t - begin)/length
+  int channels = 1;
+  Value depth;  ///< tau_c over the ray
+
+  Value at(Real t, std::size_t segment) const {
+    if (!linear && !exponential_profile) return of_segment[segment];
+    const Real s = (t - begin) / length;
+    return uniform_value<Value>(channels, linear ? first + growth * s : first * std::exp(growth * s));
+  }
+};
+
+/// Control and residual rate of every segment of a ray.
+template <class Value>
+void prepare_control(const ControlChoice& choice, const Passage<Value>& ray, Control<Value>& control, Rates& residual) {
+  const auto value = [](const Spectrum& x) { return load<Value>(x.data(), static_cast<int>(x.size())); };
+  control.of_segment.clear();
+  control.linear = choice.kind == "linear";
+  control.exponential_profile = choice.kind == "exponential";
+  control.channels = ray.channels;
+  control.begin = ray.begin;
+  control.length = ray.length();
+  control.first = choice.value;
+  control.depth = ray.value(0);
+  residual.start(ray.begin);
+  if (!(ray.length() > 0)) return;
+  if (control.linear) {
+    control.growth = choice.value_end - choice.value;
+    control.depth = ray.value((choice.value + choice.value_end) / 2 * ray.length());
+  } else if (control.exponential_profile) {
+    control.growth = std::log(choice.value_end / choice.value);
+    const Real mean = control.growth == 0 ? 1 : std::expm1(control.growth) / control.growth;
+    control.depth = ray.value(choice.value * mean * ray.length());
+  }
+  for (const Segment& segment : ray.bounds.segments) {
+    const Value low = value(segment.extinction.minimum), high = value(segment.extinction.maximum),
+                average = value(segment.extinction.average);
+    Value least = low, most = low;  // of the control inside the segment
+    if (choice.is_profile()) {
+      const Value a = control.at(segment.begin, 0), b = control.at(segment.end, 0);
+      for (int c = 0; c < ray.channels; ++c) {
+        channel(least, c) = std::min(channel(a, c), channel(b, c));
+        channel(most, c) = std::max(channel(a, c), channel(b, c));
+      }
+    } else {
+      Value constant = low;
+      if (choice.kind == "average") constant = average;
+      if (choice.kind == "middle") constant = (low + high) / 2;
+      if (choice.kind == "maximum") constant = high;
+      if (choice.kind == "medium_average") constant = value(ray.medium.average);
+      if (choice.kind == "ray_average") constant = *ray.exact_depth / ray.length();
+      if (choice.kind == "given") constant = ray.value(choice.value);
+      if (choice.kind == "gamma") {
+        for (int c = 0; c < ray.channels; ++c) {
+          const Real rate = std::max(channel(high, c) - channel(low, c), ControlChoice::kGammaRateFloor);
+          const Real raised = channel(low, c) + rate * std::expm1(std::log(choice.gamma) / (ray.bounds.cell_diagonal * rate));
+          channel(constant, c) = std::clamp(raised, channel(low, c), std::max(channel(low, c), channel(average, c)));
+        }
+      }
+      least = most = constant;
+      control.of_segment.push_back(constant);
+      control.depth += constant * (segment.end - segment.begin);
+    }
+    Real deviation = 0;
+    for (int c = 0; c < ray.channels; ++c)
+      deviation = std::max({deviation, channel(high, c) - channel(least, c), channel(most, c) - channel(low, c)});
+    residual.append(segment.end, choice.rate_scale * (choice.rate == "majorant" ? segment.majorant : deviation));
+  }
+}
+
+}  // namespace nullmark

@@ -1,0 +1,117 @@
+#include "estimators/march_theory.h"
+
+#include <algorithm>
+#include <boost/math/quadrature/gauss.hpp>
+#include <cmath>
+
+namespace nullmark {
+namespace {
+
+using Rule = boost::math::quadrature::gauss<Real, 10>;
+
+/// Nodes and weights of a 10-point rule over [a, b], appended.
+void append_rule(Real a, Real b, std::vector<Real>& x, std::vector<Real>& w) {
+  const auto& abscissa = Rule::abscissa();
+  const auto& weight = Rule::weights();
+  for (std::size_t i = 0; i < abscissa.size(); ++i) {
+    for (const Real sign : {-1., 1.}) {
+      x.push_back((a + b) / 2 + sign * abscissa[i] * (b - a) / 2);
+      w.push_back(weight[i] * (b - a) / 2);
+    }
+  }
+}
+
+std::vector<Real> lookups(const RayProfile& profile, int c, const std::vector<Real>& t) {
+  const auto channels = static_cast<std::size_t>(profile.channels());
+  std::vector<Real> all(t.size() * channels), mu(t.size());
+  profile.extinction(t.data(), t.size(), all.data());
+  for (std::size_t i = 0; i < t.size(); ++i) mu[i] = all[i * channels + static_cast<std::size_t>(c)];
+  return mu;
+}
+
+}  // namespace
+
+Theory fixed_march(const RayProfile& profile, int c, int steps, Real offset, Quantity quantity) {
+  const Real h = (profile.end() - profile.begin()) / steps;
+  std::vector<Real> t(static_cast<std::size_t>(steps));
+  for (std::size_t j = 0; j < t.size(); ++j) t[j] = profile.begin() + (static_cast<Real>(j) + offset) * h;
+  Real sum = 0;
+  for (const Real mu : lookups(profile, c, t)) sum += mu;
+  return {.mean = quantity == Quantity::transmittance ? std::exp(-h * sum) : h * sum, .variance = 0};
+}
+
+Theory stratified_march(const RayProfile& profile, int c, int steps, Quantity quantity) {
+  const Real h = (profile.end() - profile.begin()) / steps;
+  std::vector<Real> t, w;
+  std::vector<std::size_t> first;  // of each stratum
+  std::size_t cut = 0;
+  const auto cuts = profile.cuts();
+  for (int j = 0; j < steps; ++j) {
+    first.push_back(t.size());
+    Real a = profile.begin() + j * h;
+    const Real end = j + 1 == steps ? profile.end() : profile.begin() + (j + 1) * h;
+    while (a < end) {
+      while (cut < cuts.size() && cuts[cut] <= a) ++cut;
+      const Real b = cut < cuts.size() ? std::min(end, cuts[cut]) : end;
+      append_rule(a, b, t, w);
+      a = b;
+    }
+  }
+  first.push_back(t.size());
+  const std::vector<Real> mu = lookups(profile, c, t);
+
+  // Var prod Y_j = prod E[Y_j]^2 (prod (1 + v_j) - 1), v_j the relative variance of one factor, in a form that does not cancel.
+  Real log_mean = 0, log_growth = 0, tau = 0, tau_variance = 0;
+  for (std::size_t j = 0; j + 1 < first.size(); ++j) {
+    Real mean = 0, depth = 0;
+    for (std::size_t i = first[j]; i < first[j + 1]; ++i) {
+      mean += w[i] / h * std::exp(-h * mu[i]);
+      depth += w[i] * mu[i];
+    }
+    Real spread = 0, depth_spread = 0;
+    for (std::size_t i = first[j]; i < first[j + 1]; ++i) {
+      const Real deviation = mean > 0 ? std::exp(-h * mu[i]) / mean - 1 : 0;
+      spread += w[i] / h * deviation * deviation;
+      depth_spread += w[i] / h * (h * mu[i] - depth) * (h * mu[i] - depth);
+    }
+    log_mean += std::log(mean);
+    log_growth += std::log1p(spread);
+    tau += depth;
+    tau_variance += depth_spread;
+  }
+  if (quantity == Quantity::optical_depth) return {.mean = tau, .variance = tau_variance};
+  return {.mean = std::exp(log_mean), .variance = std::exp(2 * log_mean) * std::expm1(log_growth)};
+}
+
+Theory uniform_march(const RayProfile& profile, int c, int steps, Quantity quantity) {
+  const Real h = (profile.end() - profile.begin()) / steps;
+  std::vector<Real> offsets{0, 1};
+  for (const Real cut : profile.cuts()) {
+    const Real in_steps = (cut - profile.begin()) / h;
+    offsets.push_back(in_steps - std::floor(in_steps));
+  }
+  std::sort(offsets.begin(), offsets.end());
+  offsets.erase(std::unique(offsets.begin(), offsets.end(), [](Real a, Real b) { return b - a < 1e-12; }), offsets.end());
+  constexpr std::size_t kMostLookups = 200'000;
+  if (offsets.size() * 10 * static_cast<std::size_t>(steps) > kMostLookups) return {};
+
+  std::vector<Real> u, w;
+  for (std::size_t i = 0; i + 1 < offsets.size(); ++i) append_rule(offsets[i], offsets[i + 1], u, w);
+  std::vector<Real> t;
+  for (const Real o : u)
+    for (int j = 0; j < steps; ++j) t.push_back(profile.begin() + (j + o) * h);
+  const std::vector<Real> mu = lookups(profile, c, t);
+  std::vector<Real> x(u.size());
+  Real mean = 0;
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    Real sum = 0;
+    for (std::size_t j = 0; j < static_cast<std::size_t>(steps); ++j) sum += mu[i * static_cast<std::size_t>(steps) + j];
+    x[i] = quantity == Quantity::transmittance ? std::exp(-h * sum) : h * sum;
+    mean += w[i] * x[i];
+  }
+  Real variance = 0;
+  for (std::size_t i = 0; i < u.size(); ++i) variance += w[i] * (x[i] - mean) * (x[i] - mean);
+  return {.mean = mean, .variance = variance};
+}
+
+}  // namespace nullmark

@@ -1,0 +1,79 @@
+#pragma once
+
+#include "estimators/estimator.h"
+#include "estimators/march_theory.h"
+
+namespace nullmark {
+
+/// Ray marching with k = `steps` lookups at x_j = (j + o_j) h, h = d/k: tau = h sum_j mu(x_j), T = exp(-tau) [Perlin and Hoffert 1989; Pauly,
+/// Kollig, Keller 2000 for the stratified form].  Offsets: left 0, midpoint 1/2, right 1 (the seed's), uniform one u for all steps, stratified a
+/// fresh u for each.  The jittered forms are unbiased for tau; all are consistent for T, with bias T Var(tau)/2 at first order.
+template <class Value>
+struct RayMarching {
+  static constexpr const char* kName = "ray_marching";
+  static constexpr const char* kSummary = "ray marching with fixed, uniformly jittered or stratified offsets";
+  static constexpr const char* kSource = "Perlin and Hoffert 1989; Pauly, Kollig, Keller 2000";
+  static constexpr SampleRange kRange = SampleRange::unit;
+  static constexpr bool kNeedsBound = false;
+  static constexpr bool kIgnoresMajorant = true;
+
+  int steps = 32;
+  std::string offset = "midpoint";
+
+  void parameters(ParameterVisitor& visit) {
+    visit.integer("steps", steps, 1, 10'000'000, "lookups per sample, k");
+    visit.choice("offset", offset, {"left", "midpoint", "right", "uniform", "stratified"},
+                 "where in its step a lookup lies: fixed, one random offset for all steps, or one for each");
+  }
+
+  bool jittered() const { return offset == "uniform" || offset == "stratified"; }
+
+  Claim claim(Quantity quantity) const {
+    return quantity == Quantity::optical_depth && jittered() ? Claim::unbiased : Claim::consistent;
+  }
+
+  struct Ray : Passage<Value> {
+    Real step = 0, fixed = 0;
+    bool uniform = false, stratified = false;
+  };
+
+  void prepare(Ray& ray) const {
+    ray.step = ray.length() / steps;
+    ray.fixed = offset == "left" ? 0 : offset == "right" ? 1 : 0.5;
+    ray.uniform = offset == "uniform";
+    ray.stratified = offset == "stratified";
+  }
+
+  struct Walk {
+    Value sum;
+    Real offset = 0;
+    int done = 0;
+  };
+
+  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
+    walk = {ray.value(0), ray.uniform ? rng.uniform() : ray.fixed, 0};
+  }
+
+  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+    if (walk.done == steps || !(ray.step > 0)) return false;
+    if (ray.stratified) walk.offset = rng.uniform();
+    flight.jump(ray.begin + (walk.done++ + walk.offset) * ray.step);
+    return true;
+  }
+
+  void consume(Walk& walk, const Ray&, const Flight&, const Value& extinction, auto&) const { walk.sum += extinction; }
+
+  Value optical_depth(const Walk& walk, const Ray& ray) const { return walk.sum * ray.step; }
+  Value result(const Walk& walk, const Ray& ray) const { return exponential(Value(-walk.sum * ray.step)); }
+
+  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity quantity) const {
+    if (!(ray.step > 0)) return {.variance = 0, .lookups = 0};
+    Theory theory = ray.stratified ? stratified_march(profile, c, steps, quantity)
+                    : ray.uniform  ? uniform_march(profile, c, steps, quantity)
+                                   : fixed_march(profile, c, steps, ray.fixed, quantity);
+    theory.lookups = steps;
+    return theory;
+  }
+};
+
+}  // namespace nullmark

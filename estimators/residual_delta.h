@@ -1,0 +1,87 @@
+#pragma once
+
+#include "estimators/control.h"
+#include "estimators/survival.h"
+
+namespace nullmark {
+
+/// Residual delta tracking: T_c times a delta estimate of T_r [Novák, Selle, Jarosz 2014, Sec. 4].  The control must not exceed the
+/// extinction.  Values {0, T_c}, Var = T (T_c - T), lookups int mubr exp(-int_0^x (mu - mu_c)).  Channels share one walk.
+template <class Value>
+struct ResidualDeltaTracking {
+  static constexpr const char* kName = "residual_delta";
+  static constexpr const char* kSummary = "residual delta tracking: closed-form control times a delta estimate of the rest";
+  static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Sec. 4";
+  static constexpr SampleRange kRange = SampleRange::unit;
+  static constexpr bool kNeedsBound = true;
+
+  ControlChoice choice;
+
+  void parameters(ParameterVisitor& visit) {
+    visit.choice("control", choice.kind, {"minimum", "given"}, "control extinction: the segment's minimum, or given");
+    visit.number("value", choice.value, Range::non_negative(), "1/length", "control extinction (given); at most the medium's minimum");
+  }
+
+  void check(const Extrema& medium) const {
+    if (choice.kind == "given" && choice.value > medium.minimum.minCoeff())
+      throw ParameterError("value", "control exceeds the medium's least extinction; residual delta tracking needs mu_c <= mu");
+  }
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Ray : Passage<Value> {
+    Control<Value> control;
+    Rates residual;
+  };
+
+  /// The rate is what the majorant leaves above the smallest control of all channels, so that a loose majorant stays loose.
+  void prepare(Ray& ray) const {
+    prepare_control<Value>(choice, ray, ray.control, ray.residual);
+    ray.residual.start(ray.begin);
+    for (std::size_t i = 0; i < ray.bounds.segments.size(); ++i) {
+      const Segment& segment = ray.bounds.segments[i];
+      ray.residual.append(segment.end, std::max<Real>(0, segment.majorant - smallest(ray.control.of_segment[i])));
+    }
+  }
+
+  struct Walk {
+    Value transmittance;
+    bool done = false;
+  };
+
+  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+    walk = {exponential(Value(-ray.control.depth)), false};
+    flight.start(ray.residual);
+  }
+
+  bool propose(Walk& walk, const Ray&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
+
+  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+    const Real threshold = rng.uniform() * at.rate();
+    const Value control = ray.control.at(at.position(), at.piece());
+    bool any = false;
+    for (int c = 0; c < ray.channels; ++c) {
+      if (threshold < channel(extinction, c) - channel(control, c)) channel(walk.transmittance, c) = 0;
+      any = any || channel(walk.transmittance, c) > 0;
+    }
+    walk.done = !any;
+  }
+
+  Value result(const Walk& walk, const Ray&) const { return walk.transmittance; }
+
+  int real_collisions(const Walk& walk, const Ray&) const { return walk.done; }
+
+  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+    const Real transmittance = std::exp(-profile.optical_depth(c));
+    const Real residual = profile.optical_depth(c) - channel(ray.control.depth, c);
+    return {.variance = transmittance * std::exp(-channel(ray.control.depth, c)) * -std::expm1(-residual),
+            .lookups = lookups_until_killed(
+                profile,
+                [&](int k, const RayProfile::Node& at) {
+                  return std::max<Real>(0, at.extinction - channel(ray.control.at(at.t, at.piece), k));
+                },
+                [&](const RayProfile::Node& at) { return ray.residual.rate(at.piece); })};
+  }
+};
+
+}  // namespace nullmark

@@ -1,0 +1,80 @@
+#pragma once
+
+#include "estimators/control.h"
+
+namespace nullmark {
+
+/// Residual ratio tracking [Novák, Selle, Jarosz 2014, Alg. 2]: T = T_c T_r, the control's transmittance in closed form times a ratio estimate of
+/// the residual's at rate mubr.  Unbiased for any mubr > 0.  Multiplicands lie in [0,2] with mubr >= max |mu - mu_c|, so samples are
+/// non-negative but unbounded.  Var = T^2 (exp(int (mu - mu_c)^2/mubr) - 1), lookups int mubr.  `component` gives T_c or T_r alone.
+template <class Value>
+struct ResidualRatioTracking {
+  static constexpr const char* kName = "residual_ratio";
+  static constexpr const char* kSummary = "residual ratio tracking: closed-form control times a ratio estimate of the rest";
+  static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Alg. 2";
+  static constexpr SampleRange kRange = SampleRange::non_negative;
+  static constexpr bool kNeedsBound = false;
+
+  ControlChoice choice;
+  std::string component = "product";
+
+  void parameters(ParameterVisitor& visit) {
+    choice.parameters(visit);
+    visit.choice("component", component, {"product", "control", "residual"}, "what is estimated: T = T_c T_r, T_c, or T_r = T/T_c");
+  }
+
+  bool needs_optical_depth() const { return choice.kind == "ray_average"; }
+
+  void check(const Extrema&) const {
+    if (choice.kind == "exponential" && !(choice.value > 0 && choice.value_end > 0))
+      throw ParameterError("value", "an exponential control needs value and value_end above zero");
+  }
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Ray : Passage<Value> {
+    Control<Value> control;
+    Rates residual;
+    bool with_control = true, with_residual = true;
+  };
+
+  void prepare(Ray& ray) const {
+    prepare_control<Value>(choice, ray, ray.control, ray.residual);
+    ray.with_control = component != "residual";
+    ray.with_residual = component != "control";
+  }
+
+  struct Walk {
+    Value weight;
+  };
+
+  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+    walk.weight = ray.with_control ? exponential(Value(-ray.control.depth)) : ray.value(1);
+    flight.start(ray.residual);
+  }
+
+  bool propose(Walk&, const Ray& ray, Flight& flight, auto& rng) const { return ray.with_residual && flight.next(rng); }
+
+  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto&) const {
+    walk.weight *= (at.rate() - (extinction - ray.control.at(at.position(), at.piece()))) / at.rate();
+  }
+
+  Value result(const Walk& walk, const Ray&) const { return walk.weight; }
+
+  Value expected(const Value& tau, const Ray& ray) const {
+    const Value residual = ray.with_residual ? Value(tau - ray.control.depth) : ray.value(0);
+    return exponential(Value(ray.with_control ? Value(-residual - ray.control.depth) : Value(-residual)));
+  }
+
+  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+    if (!ray.with_residual) return {.variance = 0, .lookups = 0};
+    const Real spread = profile.integrate(c, [&](const RayProfile::Node& at) {
+      const Real rest = at.extinction - channel(ray.control.at(at.t, at.piece), c), rate = ray.residual.rate(at.piece);
+      return rate > 0 ? rest * rest / rate : 0;
+    });
+    const Real log_mean = -profile.optical_depth(c) + (ray.with_control ? 0 : channel(ray.control.depth, c));
+    return {.variance = std::exp(2 * log_mean) * std::expm1(spread), .lookups = ray.residual.total_depth()};
+  }
+};
+
+}  // namespace nullmark

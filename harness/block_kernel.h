@@ -1,0 +1,228 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <type_traits>
+
+#include "harness/kernel.h"
+
+namespace nullmark {
+
+namespace detail {
+
+template <class E, class Value>
+struct RayOf {
+  using type = Passage<Value>;
+};
+template <class E, class Value>
+  requires requires { typename E::Ray; }
+struct RayOf<E, Value> {
+  using type = typename E::Ray;
+};
+
+}  // namespace detail
+
+/// The loop that runs an estimator.  A block of walks of one ray steps together: all propose, the medium answers all points in one indirect
+/// call, all consume, the finished leave.  So there is one kernel per estimator and one per medium instead of one per pair, and the loop
+/// alone counts, audits the majorant and hands out random streams.
+template <template <class> class Estimator, class Value>
+class BlockKernel final : public Kernel {
+  using E = Estimator<Value>;
+  using Ray = typename detail::RayOf<E, Value>::type;
+  using Walk = typename E::Walk;
+
+  static constexpr std::size_t kBlock = 256;
+  /// A walk this long is reported as an error instead of running on: nothing may hang, and nothing may be cut short in silence.
+  static constexpr std::uint32_t kMostLookups = 1u << 30;
+  /// Relative rounding allowed to an extinction above its bound before it counts as a violation.
+  static constexpr Real kSlack = 1e-9;
+
+  struct State final : Workspace {
+    Ray ray;
+    std::array<Walk, kBlock> walk;
+    std::array<Flight, kBlock> flight;
+    std::array<Rng, kBlock> rng;
+    std::array<std::uint32_t, kBlock> active;
+    std::array<Real, kBlock> x, y, z;
+    std::array<Real, kBlock * (std::is_same_v<Value, Real> ? 1 : kMaxChannels)> extinction;
+  };
+
+ public:
+  BlockKernel(const E& estimator, int channels) : estimator_(estimator), channels_(channels) {}
+
+  bool needs_optical_depth() const override {
+    if constexpr (requires { E::kNeedsOpticalDepth; }) return E::kNeedsOpticalDepth;
+    if constexpr (requires { estimator_.needs_optical_depth(); }) return estimator_.needs_optical_depth();
+    return false;
+  }
+
+  bool needs_knots() const override {
+    if constexpr (requires { E::kNeedsKnots; }) return E::kNeedsKnots;
+    return false;
+  }
+
+  bool states_theory() const override {
+    return requires(const E& e, const Ray& ray, const RayProfile& profile) { e.theory(ray, profile, 0, Quantity::transmittance); };
+  }
+
+  bool answers(Quantity quantity) const override {
+    return quantity == Quantity::transmittance ||
+           requires(const E& e, const Walk& walk, const Ray& ray) { e.optical_depth(walk, ray); };
+  }
+
+  std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
+
+  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const RayContext& context) const override {
+    Ray& ray = static_cast<State&>(workspace).ray;
+    ray.begin = context.world.begin;
+    ray.end = context.world.end;
+    ray.channels = channels_;
+    ray.bounds.segments.assign(context.segments.segments.begin(), context.segments.segments.end());
+    ray.bounds.cell_diagonal = context.segments.cell_diagonal;
+    ray.medium = extrema;
+    ray.majorant.start(ray.begin);
+    for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
+    ray.exact_depth.reset();
+    if (context.exact_depth) ray.exact_depth = load<Value>(context.exact_depth->data(), channels_);
+    ray.knots.assign(context.knots.begin(), context.knots.end());
+    ray.degree = medium.polynomial_degree();
+    ray.entry = context.world.at(context.world.begin);
+    if constexpr (requires { estimator_.prepare(ray); }) estimator_.prepare(ray);
+  }
+
+  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+              std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
+    State& state = static_cast<State&>(workspace);
+    const auto channels = static_cast<std::size_t>(channels_);
+    out.values.resize(count * channels);
+    out.lookups.assign(count, 0);
+    counters.samples += count;
+    for (std::size_t done = 0; done < count; done += kBlock)
+      run_block(state, medium, context, key, first + done, std::min(kBlock, count - done), quantity, &out.values[done * channels],
+                &out.lookups[done], counters);
+  }
+
+  Spectrum expected(const Workspace& workspace, const Spectrum& optical_depth, Quantity quantity) const override {
+    if constexpr (requires(Value v, Ray r) { estimator_.expected(v, r); }) {
+      const Value depth = load<Value>(optical_depth.data(), channels_);
+      Spectrum result(channels_);
+      store(estimator_.expected(depth, static_cast<const State&>(workspace).ray), result.data());
+      return result;
+    }
+    return quantity == Quantity::transmittance ? Spectrum((-optical_depth).exp()) : optical_depth;
+  }
+
+  std::vector<Theory> theory(const Workspace& workspace, const RayProfile& profile, Quantity quantity) const override {
+    std::vector<Theory> result(static_cast<std::size_t>(channels_));
+    if constexpr (requires(Ray r) { estimator_.theory(r, profile, 0, quantity); }) {
+      const Ray& ray = static_cast<const State&>(workspace).ray;
+      for (int c = 0; c < channels_; ++c) result[static_cast<std::size_t>(c)] = estimator_.theory(ray, profile, c, quantity);
+    }
+    return result;
+  }
+
+ private:
+  void run_block(State& state, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+                 std::size_t count, Quantity quantity, Real* values, std::uint32_t* lookups, Counters& counters) const {
+    const Ray& ray = state.ray;
+    const auto channels = static_cast<std::size_t>(channels_);
+    for (std::size_t k = 0; k < count; ++k) {
+      state.rng[k] = Rng(SampleAddress{key, context.index, first + k});
+      state.flight[k].start(ray.majorant);
+      estimator_.init(state.walk[k], ray, state.flight[k], state.rng[k]);
+      state.active[k] = static_cast<std::uint32_t>(k);
+    }
+    const Vec3 origin = context.local.origin, direction = context.local.direction;
+    std::size_t active = count;
+    while (active > 0) {
+      std::size_t kept = 0;
+      for (std::size_t a = 0; a < active; ++a) {
+        const std::uint32_t k = state.active[a];
+        Flight& flight = state.flight[k];
+        if (estimator_.propose(state.walk[k], ray, flight, state.rng[k])) {
+          const Real t = flight.position();
+          state.x[kept] = origin.x() + t * direction.x();
+          state.y[kept] = origin.y() + t * direction.y();
+          state.z[kept] = origin.z() + t * direction.z();
+          state.active[kept++] = k;
+        } else {
+          finish(state, ray, k, quantity, values + k * channels);
+          counters.draws += state.rng[k].draws();
+          counters.lookups += lookups[k];
+          counters.null_collisions += null_collisions(state.walk[k], ray, lookups[k]);
+        }
+      }
+      active = kept;
+      if (active == 0) break;
+      medium.extinction({state.x.data(), state.y.data(), state.z.data(), active}, state.extinction.data());
+      for (std::size_t a = 0; a < active; ++a) {
+        const std::uint32_t k = state.active[a];
+        const Value extinction = load<Value>(&state.extinction[a * channels], channels_);
+        audit(ray, state.flight[k], extinction, counters);
+        estimator_.consume(state.walk[k], ray, state.flight[k], extinction, state.rng[k]);
+        if (++lookups[k] == kMostLookups) {
+          ++counters.overruns;
+          active = 0;
+        }
+      }
+    }
+  }
+
+  void finish(State& state, const Ray& ray, std::uint32_t k, Quantity quantity, Real* values) const {
+    if constexpr (requires(Walk w) { estimator_.optical_depth(w, ray); }) {
+      if (quantity == Quantity::optical_depth) {
+        store(estimator_.optical_depth(state.walk[k], ray), values);
+        return;
+      }
+    }
+    store(estimator_.result(state.walk[k], ray), values);
+  }
+
+  std::uint64_t null_collisions(const Walk& walk, const Ray& ray, std::uint32_t lookups) const {
+    if constexpr (requires { E::kIgnoresMajorant; }) return 0;
+    if constexpr (requires { estimator_.real_collisions(walk, ray); })
+      return lookups - static_cast<std::uint64_t>(estimator_.real_collisions(walk, ray));
+    return lookups;
+  }
+
+  void audit(const Ray& ray, const Flight& at, const Value& extinction, Counters& counters) const {
+    if constexpr (requires { E::kIgnoresMajorant; }) return;
+    const Real bound = ray.majorant.rate(at.piece()), most = largest(extinction);
+    if (most > bound * (1 + kSlack)) {
+      ++counters.violations;
+      counters.largest_violation = std::max(counters.largest_violation, most / bound);
+    }
+  }
+
+  E estimator_;
+  int channels_;
+};
+
+/// Adapts an estimator template to the registry: its parameters live in the grey instance.
+template <template <class> class Estimator>
+class EstimatorTemplate final : public EstimatorSource {
+ public:
+  void parameters(ParameterVisitor& visit) override {
+    visit_parameters(grey_, visit);
+    visit_parameters(chromatic_, visit);
+  }
+  Claim claim(Quantity quantity) const override { return grey_.claim(quantity); }
+  void check(const Extrema& medium) const override {
+    if constexpr (requires { grey_.check(medium); }) grey_.check(medium);
+  }
+  std::unique_ptr<const Kernel> kernel(int channels) const override {
+    if (channels == 1) return std::make_unique<BlockKernel<Estimator, Real>>(grey_, 1);
+    return std::make_unique<BlockKernel<Estimator, Spectrum>>(chromatic_, channels);
+  }
+
+ private:
+  template <class E>
+  static void visit_parameters(E& estimator, ParameterVisitor& visit) {
+    if constexpr (requires { estimator.parameters(visit); }) estimator.parameters(visit);
+  }
+
+  Estimator<Real> grey_;
+  Estimator<Spectrum> chromatic_;
+};
+
+}  // namespace nullmark

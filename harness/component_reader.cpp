@@ -1,0 +1,227 @@
+#include "harness/component_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace nullmark {
+namespace {
+
+constexpr const char* kChannels = "channels";
+
+std::string expectation(const Range& range, const std::string& unit) {
+  std::string text = "a finite number";
+  if (std::isfinite(range.low)) text = fmt::format("a finite number {} {}", range.exclusive ? ">" : ">=", range.low);
+  if (std::isfinite(range.high)) text += fmt::format(" and <= {}", range.high);
+  return unit.empty() ? text : text + " in " + unit;
+}
+
+Real number_within(const Place& place, const Range& range, const std::string& unit) {
+  if (!place.json().is_number()) place.expected(expectation(range, unit));
+  const Real value = place.number();
+  if (!std::isfinite(value) || !range.contains(value)) place.expected(expectation(range, unit));
+  return value;
+}
+
+std::vector<Real> numbers_within(const Place& place, std::size_t least, std::size_t most, const Range& range,
+                                 const std::string& unit) {
+  const std::string length = least == most ? fmt::format("a list of {} numbers", least)
+                                           : fmt::format("a list of {} to {} numbers", least, most);
+  if (!place.json().is_array() || place.json().size() < least || place.json().size() > most) place.expected(length);
+  std::vector<Real> values;
+  for (const Place& element : place.elements()) values.push_back(number_within(element, range, unit));
+  return values;
+}
+
+bool holds_list(const ParameterInfo& parameter) {
+  return std::holds_alternative<std::vector<Real>>(parameter.default_value) ||
+         std::holds_alternative<std::array<Real, 3>>(parameter.default_value);
+}
+
+ParameterValue read_value(const ParameterInfo& parameter, const Place& place) {
+  switch (parameter.default_value.index()) {
+    case 0: return number_within(place, parameter.range, parameter.unit);
+    case 1: return static_cast<int>(place.integer(parameter.low, parameter.high));
+    case 2: return place.boolean();
+    case 3: return parameter.allowed.empty() ? place.string() : place.one_of(parameter.allowed, parameter.name.c_str());
+    case 4:
+      return numbers_within(place, static_cast<std::size_t>(parameter.least), static_cast<std::size_t>(parameter.most),
+                            parameter.range, parameter.unit);
+    default: {
+      const std::vector<Real> point = numbers_within(place, 3, 3, Range::any(), parameter.unit);
+      return std::array{point[0], point[1], point[2]};
+    }
+  }
+}
+
+/// One value, or each of a swept list's.
+std::vector<Place> swept(const Place& place, bool value_is_list) {
+  const Json& json = place.json();
+  const bool sweep = json.is_array() && (!value_is_list || (!json.empty() && json[0].is_array()));
+  if (sweep && json.empty()) place.expected("at least one value");
+  return sweep ? place.elements() : std::vector<Place>{place};
+}
+
+template <class Spec, class Value, class Set>
+std::vector<Spec> crossed(const std::vector<Spec>& specs, const std::vector<Value>& values, const Set& set) {
+  std::vector<Spec> result;
+  for (const Spec& spec : specs)
+    for (const Value& value : values) {
+      result.push_back(spec);
+      set(result.back(), value);
+    }
+  return result;
+}
+
+std::vector<std::string> names_of(const std::vector<ComponentInfo>& entries) {
+  std::vector<std::string> names;
+  for (const ComponentInfo& entry : entries) names.push_back(entry.name);
+  return names;
+}
+
+/// The entry's type, checked, and the place to blame for it.
+std::string read_type(ComponentKind kind, const Place& place) {
+  std::vector<std::string> names = names_of(registered(kind));
+  if (kind == ComponentKind::medium) names.push_back(kChannels);
+  if (place.json().is_string()) return place.one_of(names, to_string(kind));
+  if (!place.json().is_object()) place.expected(fmt::format("the name of a {} or an object with \"type\"", to_string(kind)));
+  return place["type"].one_of(names, to_string(kind));
+}
+
+/// Components with the values that are given; `extra` keys are someone else's.
+std::vector<Component> read_given(ComponentKind kind, const Place& place, const std::vector<std::string>& extra = {}) {
+  Component first;
+  first.type = read_type(kind, place);
+  first.pointer = place.where();
+  std::vector<Component> components = {first};
+  if (place.json().is_string()) return components;
+
+  const std::vector<ParameterInfo> parameters = parameters_of(kind, first.type);
+  std::vector<std::string> keys = extra;
+  keys.push_back("type");
+  for (const ParameterInfo& parameter : parameters) keys.push_back(parameter.name);
+  for (const auto& [key, json] : place.json().items()) {
+    const auto named = [&name = key](const ParameterInfo& parameter) { return parameter.name == name; };
+    const auto parameter = std::find_if(parameters.begin(), parameters.end(), named);
+    if (parameter == parameters.end()) {
+      if (key.rfind("x-", 0) != 0 && std::find(keys.begin(), keys.end(), key) == keys.end())
+        place[key].unknown(fmt::format("parameter of {}", first.type), key, keys);
+      continue;
+    }
+    std::vector<ParameterValue> values;
+    for (const Place& value : swept(place[key], holds_list(*parameter))) values.push_back(read_value(*parameter, value));
+    components = crossed(components, values,
+                         [&name = key](Component& component, const ParameterValue& value) { component.values[name] = value; });
+  }
+  return components;
+}
+
+void complete(ComponentKind kind, Component& component) {
+  const std::vector<ParameterInfo> parameters = parameters_of(kind, component.type);
+  for (const ParameterInfo& parameter : parameters) component.values.emplace(parameter.name, parameter.default_value);
+  component.label = make_label(component.type, component.values, parameters);
+}
+
+void complete(MediumSpec& medium) {
+  if (medium.per_channel.empty()) {
+    complete(ComponentKind::medium, medium.field);
+    medium.label = medium.field.label;
+    if (!medium.spectrum.empty()) medium.label += "/spectrum:" + to_text(medium.spectrum);
+    return;
+  }
+  for (MediumSpec& channel : medium.per_channel) {
+    complete(channel);
+    medium.label += (medium.label.empty() ? "channels(" : "|") + channel.label;
+    medium.optional |= channel.optional;
+  }
+  medium.label += ")";
+  medium.field.label = medium.label;
+}
+
+std::vector<MediumSpec> read_given_media(const Place& place) {
+  MediumSpec first;
+  if (place.json().is_object() && place.has("optional")) first.optional = place["optional"].boolean();
+  std::vector<MediumSpec> media = {first};
+
+  if (read_type(ComponentKind::medium, place) == kChannels) {
+    if (!place.json().is_object()) place.expected("an object with \"type\" and \"media\"");
+    place.expect_keys({"type", "media", "optional"});
+    const std::vector<Place> channels = place["media"].elements();
+    if (channels.empty() || channels.size() > kMaxChannels)
+      place["media"].expected(fmt::format("1 to {} media, one per channel", kMaxChannels));
+    media[0].field.type = kChannels;
+    media[0].field.pointer = place.where();
+    for (const Place& channel : channels) {
+      const std::vector<MediumSpec> variants = read_given_media(channel);
+      if (!variants[0].spectrum.empty() || !variants[0].per_channel.empty())
+        channel.fail("a channel's medium must be grey; expected neither \"spectrum\" nor \"channels\" inside \"channels\"");
+      media = crossed(media, variants,
+                      [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
+    }
+    return media;
+  }
+
+  const std::vector<Component> fields = read_given(ComponentKind::medium, place, {"spectrum", "optional"});
+  media = crossed(media, fields, [](MediumSpec& medium, const Component& field) { medium.field = field; });
+  if (place.json().is_object() && place.has("spectrum")) {
+    std::vector<std::vector<Real>> spectra;
+    for (const Place& spectrum : swept(place["spectrum"], true))
+      spectra.push_back(numbers_within(spectrum, 1, kMaxChannels, Range::non_negative(), ""));
+    media = crossed(media, spectra, [](MediumSpec& medium, const std::vector<Real>& spectrum) { medium.spectrum = spectrum; });
+  }
+  return media;
+}
+
+}  // namespace
+
+std::vector<Component> read_components(ComponentKind kind, const Place& place) {
+  std::vector<Component> components = read_given(kind, place);
+  for (Component& component : components) complete(kind, component);
+  return components;
+}
+
+std::vector<MediumSpec> read_media(const Place& place) {
+  std::vector<MediumSpec> media = read_given_media(place);
+  for (MediumSpec& medium : media) complete(medium);
+  return media;
+}
+
+std::vector<Component> read_component_patterns(ComponentKind kind, const Place& place) {
+  std::vector<Component> patterns;
+  for (const Place& entry : place.elements_or_self())
+    for (Component& pattern : read_given(kind, entry)) patterns.push_back(std::move(pattern));
+  return patterns;
+}
+
+std::vector<MediumSpec> read_medium_patterns(const Place& place) {
+  std::vector<MediumSpec> patterns;
+  for (const Place& entry : place.elements_or_self()) {
+    // "channels" alone is a pattern, though no medium.
+    if (entry.json() == kChannels || (entry.json().is_object() && entry.json().size() == 1 && entry["type"].json() == kChannels)) {
+      MediumSpec any_channels;
+      any_channels.field.type = kChannels;
+      patterns.push_back(any_channels);
+      continue;
+    }
+    for (MediumSpec& pattern : read_given_media(entry)) patterns.push_back(std::move(pattern));
+  }
+  return patterns;
+}
+
+bool matches(const Component& pattern, const Component& component) {
+  return pattern.type == component.type && std::all_of(pattern.values.begin(), pattern.values.end(), [&](const auto& given) {
+           const auto at = component.values.find(given.first);
+           return at != component.values.end() && at->second == given.second;
+         });
+}
+
+bool matches(const MediumSpec& pattern, const MediumSpec& medium) {
+  if (!matches(pattern.field, medium.field)) return false;
+  if (!pattern.spectrum.empty() && pattern.spectrum != medium.spectrum) return false;
+  return pattern.per_channel.empty() ||
+         std::equal(pattern.per_channel.begin(), pattern.per_channel.end(), medium.per_channel.begin(), medium.per_channel.end(),
+                    [](const MediumSpec& a, const MediumSpec& b) { return matches(a, b); });
+}
+
+}  // namespace nullmark

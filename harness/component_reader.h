@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "harness/json_input.h"
+#include "harness/parameter_values.h"
+#include "harness/plan.h"
+
+namespace nullmark {
+
+/// The components that a configuration's entry stands for, complete with defaults and labels: "ratio", {"type": "ratio"}, or with
+/// lists in place of single parameter values, all combinations of them, the first key varying slowest.
+std::vector<Component> read_components(ComponentKind kind, const Place& place);
+std::vector<MediumSpec> read_media(const Place& place);
+
+/// Partial specifications: type and the parameters that are given, nothing else.  A list stands for any of its entries.
+std::vector<Component> read_component_patterns(ComponentKind kind, const Place& place);
+std::vector<MediumSpec> read_medium_patterns(const Place& place);
+bool matches(const Component& pattern, const Component& component);
+bool matches(const MediumSpec& pattern, const MediumSpec& medium);
+
+}  // namespace nullmark

@@ -1,0 +1,34 @@
+#include "harness/image.h"
+
+#include <spng.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+
+namespace nullmark {
+
+void write_png(const std::string& path, int width, int height, int channels, const std::vector<Real>& values, Real maximum) {
+  const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height), n = static_cast<std::size_t>(channels);
+  std::vector<std::uint8_t> pixels(w * h * 3);
+  for (std::size_t y = 0; y < h; ++y)
+    for (std::size_t x = 0; x < w; ++x)
+      for (std::size_t c = 0; c < 3; ++c) {
+        const Real value = values[((h - 1 - y) * w + x) * n + (n == 3 ? c : 0)] / maximum;
+        pixels[(y * w + x) * 3 + c] = !std::isfinite(value)
+                                          ? (c == 1 ? 0 : 255)
+                                          : static_cast<std::uint8_t>(std::lround(255 * std::min<Real>(1, std::max<Real>(0, value))));
+      }
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"), &std::fclose);
+  if (!file) throw std::runtime_error(path + ": cannot be written");
+  const std::unique_ptr<spng_ctx, void (*)(spng_ctx*)> context(spng_ctx_new(SPNG_CTX_ENCODER), &spng_ctx_free);
+  spng_ihdr header{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), 8, SPNG_COLOR_TYPE_TRUECOLOR, 0, 0, 0};
+  spng_set_png_file(context.get(), file.get());
+  spng_set_ihdr(context.get(), &header);
+  if (const int error = spng_encode_image(context.get(), pixels.data(), pixels.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE))
+    throw std::runtime_error(path + ": " + spng_strerror(error));
+}
+
+}  // namespace nullmark

@@ -1,0 +1,83 @@
+#include "harness/metrics.h"
+
+#include <cmath>
+
+namespace nullmark {
+namespace {
+
+using Field = std::optional<Real> ChannelRecord::*;
+
+std::optional<Real> channel_average(const CellRecord& record, Field field) {
+  Real sum = 0;
+  for (const ChannelRecord& channel : record.channel) {
+    if (!(channel.*field)) return std::nullopt;
+    sum += *(channel.*field);
+  }
+  if (record.channel.empty()) return std::nullopt;
+  return sum / static_cast<Real>(record.channel.size());
+}
+
+std::optional<Real> channel_root_mean_square(const CellRecord& record, Field field) {
+  Real sum = 0;
+  for (const ChannelRecord& channel : record.channel) {
+    if (!(channel.*field)) return std::nullopt;
+    sum += *(channel.*field) * *(channel.*field);
+  }
+  if (record.channel.empty()) return std::nullopt;
+  return std::sqrt(sum / static_cast<Real>(record.channel.size()));
+}
+
+std::optional<Real> best_variance(const CellRecord& record, std::size_t channel) {
+  const ChannelRecord& of = record.channel[channel];
+  return of.variance_theory ? of.variance_theory : of.variance;
+}
+
+}  // namespace
+
+const std::vector<std::string>& metric_names() {
+  static const std::vector<std::string> kNames = {"mean",          "bias",     "rmse",
+                                                  "variance",      "kurtosis", "relative_variance",
+                                                  "ns_per_sample", "ns_per_lookup", "lookups_per_sample"};
+  return kNames;
+}
+
+std::optional<Real> metric(const CellRecord& record, std::string_view name) {
+  if (name == "mean") return channel_average(record, &ChannelRecord::mean);
+  if (name == "bias") return channel_average(record, &ChannelRecord::bias);
+  if (name == "rmse") return channel_root_mean_square(record, &ChannelRecord::rmse);
+  if (name == "variance") return channel_average(record, &ChannelRecord::variance);
+  if (name == "kurtosis") return channel_average(record, &ChannelRecord::kurtosis);
+  if (name == "relative_variance") return channel_average(record, &ChannelRecord::relative_variance);
+  if (name == "lookups_per_sample") return record.lookups_per_sample;
+  if (name == "ns_per_sample" && record.time) return record.time->ns_per_sample;
+  if (name == "ns_per_lookup" && record.time) return record.time->ns_per_lookup;
+  return std::nullopt;
+}
+
+std::optional<Real> metric_theory(const CellRecord& record, std::string_view name) {
+  if (name == "mean") return channel_average(record, &ChannelRecord::reference);
+  if (name == "rmse") return channel_root_mean_square(record, &ChannelRecord::rmse_theory);
+  if (name == "variance") return channel_average(record, &ChannelRecord::variance_theory);
+  if (name == "lookups_per_sample") return record.lookups_theory;
+  return std::nullopt;
+}
+
+std::optional<Real> variance_x_lookups(const CellRecord& record, std::size_t channel) {
+  const std::optional<Real> variance = best_variance(record, channel);
+  if (!variance || !record.lookups_per_sample) return std::nullopt;
+  return *variance * *record.lookups_per_sample;
+}
+
+std::optional<Real> variance_x_ns(const CellRecord& record, std::size_t channel) {
+  const std::optional<Real> variance = best_variance(record, channel);
+  if (!variance || !record.time) return std::nullopt;
+  return *variance * record.time->ns_per_sample;
+}
+
+std::optional<Real> seconds_to_1pct(const CellRecord& record, std::size_t channel) {
+  const std::optional<Real>& relative = record.channel[channel].relative_variance;
+  if (!relative || !record.time) return std::nullopt;
+  return *relative / 1e-4 * record.time->ns_per_sample * 1e-9;
+}
+
+}  // namespace nullmark

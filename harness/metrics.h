@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "harness/record.h"
+
+namespace nullmark {
+
+/// Above this relative variance a sample variance tells little; tables show the theory instead, marked.
+inline constexpr Real kHeavyTail = 100;
+
+/// What a table may show.
+const std::vector<std::string>& metric_names();
+
+/// A metric of a cell, averaged over its channels (root mean square for "rmse"), and what theory says of it; nothing where it is
+/// not known.
+std::optional<Real> metric(const CellRecord& record, std::string_view name);
+std::optional<Real> metric_theory(const CellRecord& record, std::string_view name);
+
+/// variance x lookups and variance x ns: lower is better.  Variance is the analytic one where known.
+std::optional<Real> variance_x_lookups(const CellRecord& record, std::size_t channel);
+std::optional<Real> variance_x_ns(const CellRecord& record, std::size_t channel);
+
+/// Time of one thread until the pooled mean's standard error is 1 % of it: relative variance x ns per sample / 1e-4, in seconds.
+std::optional<Real> seconds_to_1pct(const CellRecord& record, std::size_t channel);
+
+}  // namespace nullmark

@@ -1,0 +1,374 @@
+#include "harness/run.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <thread>
+
+#include "harness/image.h"
+#include "harness/names.h"
+#include "harness/parameter_values.h"
+#include "harness/sampling.h"
+#include "harness/timing.h"
+
+namespace nullmark {
+namespace {
+
+/// A cell with all that it samples from; `reason` is set where it cannot run.
+struct PreparedCell {
+  const Cell* cell = nullptr;
+  std::size_t index = 0;
+  std::shared_ptr<const Scene> scene;
+  std::shared_ptr<const Kernel> kernel;
+  std::string reason;
+  CellTheory theory;
+  std::uint64_t samples_per_ray = 0;
+};
+
+/// Adds the component's JSON pointer to what its construction complains of.
+template <class F>
+auto located(const std::string& pointer, F&& f) {
+  try {
+    return f();
+  } catch (const ParameterError& error) {
+    throw ParameterError(error.parameter.empty() ? pointer : pointer + "/" + error.parameter, error.what());
+  }
+}
+
+/// Builds media, majorant structures, rays and references once each, on demand.
+class Workshop {
+ public:
+  explicit Workshop(const Plan& plan) : plan_(plan) {}
+
+  PreparedCell prepare(const Cell& cell, std::size_t index) {
+    PreparedCell prepared{&cell, index, nullptr, nullptr, "", {}, cell.samples_per_ray};
+    const MediumSpec& spec = plan_.media[cell.medium];
+    if (const auto missing = missing_.find(cell.medium); missing != missing_.end()) {
+      prepared.reason = missing->second;
+      return prepared;
+    }
+    try {
+      prepared.scene = scene(cell);
+    } catch (const MissingData& error) {
+      if (!spec.optional)
+        throw ParameterError(spec.field.pointer + "/file",
+                             std::string(error.what()) + "; say \"optional\": true to skip such cells");
+      prepared.reason = missing_[cell.medium] = error.what();
+      return prepared;
+    }
+    const auto source = located(cell.estimator.pointer, [&] { return make_estimator(cell.estimator); });
+    located(cell.estimator.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
+    prepared.kernel = source->kernel(prepared.scene->medium->medium->channels());
+    prepared.reason = why_not(cell, *prepared.scene, *prepared.kernel);
+    return prepared;
+  }
+
+ private:
+  static std::string why_not(const Cell& cell, const Scene& scene, const Kernel& kernel) {
+    if (!kernel.answers(cell.quantity))
+      return fmt::format("{} does not answer {}", cell.estimator.type, to_string(cell.quantity));
+    if (kernel.needs_knots() && !scene.medium->medium->polynomial_degree())
+      return "no exact traversal: the medium is not polynomial between knots";
+    if (kernel.needs_optical_depth() && scene.reference->method != "closed_form")
+      return "the medium has no closed-form optical depth";
+    return "";
+  }
+
+  template <class Key, class Value, class Make>
+  static std::shared_ptr<const Value> once(std::map<Key, std::shared_ptr<const Value>>& cache, const Key& key, Make&& make) {
+    std::shared_ptr<const Value>& entry = cache[key];
+    if (!entry) entry = make();
+    return entry;
+  }
+
+  std::shared_ptr<const Scene> scene(const Cell& cell) {
+    return once(scenes_, std::array{cell.medium, cell.majorant, cell.rays}, [&] {
+      const auto medium = once(media_, cell.medium, [&] {
+        return located(plan_.media[cell.medium].field.pointer,
+                       [&] { return std::make_shared<const BuiltMedium>(build_medium(plan_.media[cell.medium])); });
+      });
+      const Component& majorant = plan_.majorants[cell.majorant];
+      const auto structure = once(structures_, std::array{cell.medium, cell.majorant}, [&] {
+        return located(majorant.pointer,
+                       [&] { return std::shared_ptr<const MajorantStructure>(make_majorant(majorant)->build(medium->medium)); });
+      });
+      const Component& set = plan_.ray_sets[cell.rays];
+      const auto rays = once(rays_, std::array{cell.medium, cell.rays}, [&] {
+        return located(set.pointer, [&] { return std::make_shared<const BuiltRays>(build_rays(set, *medium)); });
+      });
+      const auto reference = once(references_, std::array{cell.medium, cell.rays},
+                                  [&] { return std::make_shared<const Reference>(compute_reference(*medium, *rays)); });
+      return std::make_shared<const Scene>(Scene{medium, structure, rays, reference});
+    });
+  }
+
+  const Plan& plan_;
+  std::map<std::size_t, std::string> missing_;
+  std::map<std::size_t, std::shared_ptr<const BuiltMedium>> media_;
+  std::map<std::array<std::size_t, 2>, std::shared_ptr<const MajorantStructure>> structures_;
+  std::map<std::array<std::size_t, 2>, std::shared_ptr<const BuiltRays>> rays_;
+  std::map<std::array<std::size_t, 2>, std::shared_ptr<const Reference>> references_;
+  std::map<std::array<std::size_t, 3>, std::shared_ptr<const Scene>> scenes_;
+};
+
+/// Theory of all runnable cells, scene by scene; a measurement stage changes the law of the samples, so those cells have none.
+/// Where samples are planned by lookups, their number follows from it.
+void add_theory(std::vector<PreparedCell>& cells) {
+  std::map<const Scene*, std::vector<PreparedCell*>> by_scene;
+  for (PreparedCell& prepared : cells) {
+    const bool plain = prepared.cell->measurement == Measurement{};
+    if (prepared.reason.empty() && plain && prepared.kernel->states_theory()) by_scene[prepared.scene.get()].push_back(&prepared);
+  }
+  for (auto& [scene, members] : by_scene) {
+    std::vector<const Kernel*> kernels;
+    std::vector<Quantity> quantities;
+    for (const PreparedCell* member : members) {
+      kernels.push_back(member->kernel.get());
+      quantities.push_back(member->cell->quantity);
+    }
+    const std::vector<CellTheory> theory = compute_theory(*scene, kernels, quantities);
+    for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
+  }
+  for (PreparedCell& prepared : cells) {
+    if (!prepared.cell->equal_lookups || !prepared.reason.empty()) continue;
+    if (!prepared.theory.lookups || !(*prepared.theory.lookups > 0))
+      prepared.reason = "equal_lookups needs an estimator and medium with known expected lookups above 0";
+    else
+      prepared.samples_per_ray = std::max<std::uint64_t>(
+          1, static_cast<std::uint64_t>(std::llround(*prepared.cell->equal_lookups / *prepared.theory.lookups)));
+  }
+}
+
+std::optional<Real> finite(Real x) { return std::isfinite(x) ? std::optional(x) : std::nullopt; }
+
+CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
+  const Cell& cell = *prepared.cell;
+  CellRecord record;
+  record.cell = cell;
+  record.cell.samples_per_ray = prepared.samples_per_ray;
+  record.medium = plan.media[cell.medium];
+  record.majorant = plan.majorants[cell.majorant];
+  record.ray_set = plan.ray_sets[cell.rays];
+  const auto* entry = Registry<EstimatorEntry>::instance().find(cell.estimator.type);
+  record.claims = to_string(make_estimator(cell.estimator)->claim(cell.quantity));
+  record.range = to_string(entry->range);
+  if (prepared.scene) {
+    record.channels = prepared.scene->medium->medium->channels();
+    record.rays = prepared.scene->rays->world.size();
+    record.medium_hash = fmt::format("{:016x}", prepared.scene->medium->hash);
+    if (record.channels > 1) record.effects.push_back("chromatic");
+  }
+  return record;
+}
+
+void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled) {
+  const Scene& scene = *prepared.scene;
+  const Cell& cell = *prepared.cell;
+  const auto rays = static_cast<std::size_t>(record.rays);
+  const auto n = static_cast<Real>(rays), samples = static_cast<Real>(record.cell.samples_per_ray);
+  const auto channels = static_cast<std::size_t>(record.channels);
+  record.samples = sampled.counters.samples;
+  record.lookups = sampled.counters.lookups;
+  record.draws = sampled.counters.draws;
+  const auto total = static_cast<Real>(sampled.counters.samples);
+  record.lookups_per_sample = static_cast<Real>(record.lookups) / total;
+  record.draws_per_sample = static_cast<Real>(record.draws) / total;
+  record.null_collisions_per_sample = static_cast<Real>(sampled.counters.null_collisions) / total;
+  record.lookups_theory = prepared.theory.lookups;
+  record.majorant_violations = sampled.counters.violations;
+  if (sampled.counters.violations > 0) record.largest_violation = finite(sampled.counters.largest_violation);
+  record.nonfinite = sampled.nonfinite;
+  record.reference_method = scene.reference->method + (cell.measurement == Measurement{} ? "" : ", measured");
+  record.status = Status::ok;
+  if (sampled.nonfinite > 0) {
+    record.status = Status::error;
+    record.reason = fmt::format("{} of {} samples are not finite", sampled.nonfinite, sampled.counters.samples);
+  } else if (sampled.counters.overruns > 0) {
+    record.status = Status::error;
+    record.reason = fmt::format("{} walks exceeded the bound on lookups", sampled.counters.overruns);
+  }
+  record.variance_basis = "sample";
+  for (std::size_t c = 0; c < channels; ++c) {
+    Moments pooled;
+    Real mean = 0, reference = 0, reference_square = 0, error = 0, bias = 0, squares = 0, variance = 0;
+    for (std::size_t ray = 0; ray < rays; ++ray) {
+      const Moments& moments = sampled.moments[ray * channels + c];
+      const Real truth = sampled.reference[ray * channels + c];
+      pooled += moments;
+      bias += moments.mean();
+      squares += moments.mean() * moments.mean();
+      variance += moments.variance();
+      mean += truth + moments.mean();
+      reference += truth;
+      reference_square += truth * truth;
+      const Real depth_error = scene.reference->error[ray * channels + c];
+      error += cell.quantity == Quantity::transmittance ? truth * depth_error : depth_error;
+    }
+    ChannelRecord out;
+    out.mean = finite(mean / n);
+    out.reference = finite(reference / n);
+    out.reference_error = finite(error / n);
+    out.bias = finite(bias / n);
+    out.rmse = finite(std::sqrt(squares / n));
+    if (record.cell.samples_per_ray > 1) out.variance = finite(variance / n);
+    if (c < prepared.theory.variance.size() && prepared.theory.variance[c]) {
+      out.variance_theory = finite(*prepared.theory.variance[c]);
+      out.rmse_theory = finite(std::sqrt(*prepared.theory.variance[c] / samples + prepared.theory.squared_bias[c].value_or(0)));
+      record.variance_basis = "analytic";
+    }
+    const std::optional<Real> best = out.variance_theory ? out.variance_theory : out.variance;
+    if (best && reference_square > 0) out.relative_variance = finite(*best * n / reference_square);
+    const auto count = static_cast<Real>(pooled.count);
+    if (pooled.s2 > 0) out.kurtosis = finite(count * pooled.s4 / (pooled.s2 * pooled.s2));
+    record.channel.push_back(out);
+
+    const std::vector<GroupErrors::Level>& levels = sampled.groups[c].levels();
+    for (std::size_t level = 0; level < levels.size(); ++level) {
+      if (level >= record.convergence.size()) record.convergence.push_back({std::uint64_t{1} << level, {}, {}});
+      const Real mean_square = levels[level].sum_of_squares / static_cast<Real>(levels[level].groups);
+      record.convergence[level].rmse.push_back(finite(std::sqrt(mean_square)));
+      record.convergence[level].variance.push_back(finite(std::max<Real>(0, mean_square - bias / n * (bias / n))));
+    }
+  }
+}
+
+void write_images(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled, const RunOptions& options,
+                  const RunObserver& observer) {
+  const BuiltRays& rays = *prepared.scene->rays;
+  if (!prepared.cell->images || rays.width == 0 || options.image_directory.empty()) return;
+  const auto channels = static_cast<std::size_t>(record.channels);
+  const std::size_t shown = channels >= 3 ? 3 : 1;
+  std::vector<Real> mean, variance, reference, lookups;
+  for (std::size_t ray = 0; ray < rays.world.size(); ++ray) {
+    for (std::size_t c = 0; c < shown; ++c) {
+      const Moments& moments = sampled.moments[ray * channels + c];
+      reference.push_back(sampled.reference[ray * channels + c]);
+      mean.push_back(reference.back() + moments.mean());
+      variance.push_back(moments.variance());
+    }
+    lookups.push_back(static_cast<Real>(sampled.lookups[ray]) / static_cast<Real>(prepared.samples_per_ray));
+  }
+  const auto greatest = [](const std::vector<Real>& values) {
+    const Real most = *std::max_element(values.begin(), values.end());
+    return most > 0 ? most : 1;
+  };
+  try {
+    std::filesystem::create_directories(options.image_directory);
+    const auto write = [&](const char* kind, const std::vector<Real>& values, std::size_t count, Real maximum) {
+      const std::string file = fmt::format("{}.{}.png", prepared.cell->id, kind);
+      write_png((std::filesystem::path(options.image_directory) / file).string(), rays.width, rays.height,
+                static_cast<int>(count), values, maximum);
+      record.images[kind] = (std::filesystem::path(options.image_prefix) / file).string();
+    };
+    write("mean", mean, shown, prepared.cell->image_maximum);
+    write("reference", reference, shown, prepared.cell->image_maximum);
+    write("variance", variance, shown, greatest(variance));
+    write("lookups", lookups, 1, greatest(lookups));
+  } catch (const std::exception& error) {
+    observer.warning(error.what());
+  }
+}
+
+std::vector<PreparedCell> prepare_all(const Plan& plan, const std::vector<bool>& selected,
+                                      const std::vector<CellRecord>& finished) {
+  Workshop workshop(plan);
+  std::vector<PreparedCell> cells;
+  for (std::size_t i = 0; i < plan.cells.size(); ++i) {
+    const auto same = [&](const CellRecord& record) { return record.cell.id == plan.cells[i].id; };
+    if (selected[i] && std::none_of(finished.begin(), finished.end(), same)) cells.push_back(workshop.prepare(plan.cells[i], i));
+  }
+  return cells;
+}
+
+}  // namespace
+
+std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
+                                 const RunOptions& options, const RunObserver& observer) {
+  const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(std::max(1, threads)));
+  const auto start = std::chrono::steady_clock::now();
+  const auto stop = [&] { return options.interrupted && options.interrupted->load() != 0; };
+
+  std::vector<PreparedCell> cells = prepare_all(plan, selected, finished);
+  if (!stop()) add_theory(cells);
+
+  std::map<std::size_t, CellRecord> records;  // by place in the plan
+  for (std::size_t i = 0; i < plan.cells.size(); ++i)
+    for (const CellRecord& record : finished)
+      if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = record;
+
+  std::vector<const PreparedCell*> to_time;
+  std::size_t done = 0;
+  for (PreparedCell& prepared : cells) {
+    CellRecord record = blank_record(plan, prepared);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (!prepared.reason.empty()) {
+      record.status = Status::skipped;
+      record.reason = prepared.reason;
+    } else if (stop()) {
+      record.reason = "interrupted";
+    } else if (options.time_budget && seconds > *options.time_budget) {
+      record.reason = "time budget spent";
+    } else {
+      Cell cell = *prepared.cell;
+      cell.samples_per_ray = prepared.samples_per_ray;
+      const auto sampled = sample_cell(cell, *prepared.scene, *prepared.kernel, stop,
+                                       [&](double fraction) { observer.progress(record, fraction); });
+      if (!sampled) {
+        record.reason = "interrupted";
+      } else {
+        fill_statistics(record, prepared, *sampled);
+        write_images(record, prepared, *sampled, options, observer);
+        if (record.status == Status::ok) to_time.push_back(&prepared);
+      }
+    }
+    records[prepared.index] = record;
+    observer.cell_done(record, ++done, cells.size());
+  }
+
+  if (options.timing && plan.timing.enabled && !to_time.empty() && !stop()) {
+    std::vector<TimedCell> timed;
+    for (const PreparedCell* prepared : to_time) timed.push_back({prepared->cell, prepared->scene.get(), prepared->kernel.get()});
+    const auto times = time_cells(timed, plan.timing, stop, [&](double fraction) { observer.timing(fraction); });
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      CellRecord& record = records[to_time[i]->index];
+      record.time = times[i];
+      if (times[i]) observer.cell_timed(record);
+    }
+  }
+  std::vector<CellRecord> result;
+  for (auto& [index, record] : records) result.push_back(std::move(record));
+  return result;
+}
+
+std::vector<Prediction> predict(const Plan& plan, const std::vector<bool>& selected) {
+  std::vector<PreparedCell> cells = prepare_all(plan, selected, {});
+  add_theory(cells);
+  std::vector<Prediction> result;
+  for (const PreparedCell& prepared : cells) {
+    Prediction prediction;
+    prediction.status = prepared.reason.empty() ? "ok" : prepared.reason;
+    if (prepared.scene) {
+      prediction.rays = prepared.scene->rays->world.size();
+      prediction.samples_per_ray = prepared.samples_per_ray;
+      prediction.lookups_per_sample = prepared.theory.lookups;
+      Real squares = 0;
+      const Reference& reference = *prepared.scene->reference;
+      const auto channels = static_cast<std::size_t>(reference.channels);
+      for (std::size_t ray = 0; ray < prediction.rays; ++ray) {
+        const Real depth = reference.depth[ray * channels];
+        const Real truth = prepared.cell->quantity == Quantity::transmittance ? std::exp(-depth) : depth;
+        squares += truth * truth;
+      }
+      if (!prepared.theory.variance.empty() && prepared.theory.variance[0] && squares > 0)
+        prediction.relative_variance = finite(*prepared.theory.variance[0] * static_cast<Real>(prediction.rays) / squares);
+    }
+    result.push_back(prediction);
+  }
+  return result;
+}
+
+}  // namespace nullmark

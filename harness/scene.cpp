@@ -1,0 +1,161 @@
+#include "harness/scene.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <boost/math/quadrature/gauss_kronrod.hpp>
+#include <numeric>
+
+#include "estimators/gauss_points.h"
+#include "harness/hash.h"
+#include "harness/parameter_values.h"
+#include "media/channels.h"
+
+namespace nullmark {
+namespace {
+
+std::shared_ptr<const Medium> build_field(const MediumSpec& spec) {
+  if (!spec.per_channel.empty()) {
+    std::vector<std::shared_ptr<const Medium>> fields;
+    for (const MediumSpec& channel : spec.per_channel) fields.push_back(build_field(channel));
+    return std::make_shared<PerChannel>(std::move(fields));
+  }
+  std::shared_ptr<const Medium> field = make_medium(spec.field)->build();
+  if (spec.spectrum.empty()) return field;
+  return std::make_shared<Spectral>(std::move(field), spec.spectrum);
+}
+
+constexpr Real kEpsilon = std::numeric_limits<Real>::epsilon();
+
+}  // namespace
+
+BuiltMedium build_medium(const MediumSpec& spec) {
+  BuiltMedium built;
+  built.medium = build_field(spec);
+  const Box box = built.medium->bounds();
+  built.extrema = built.medium->extrema(box);
+  const Affine to_world = built.medium->world_to_local().inverse();
+  built.world_bounds = {Vec3::Constant(kInfinity), Vec3::Constant(-kInfinity)};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 p(corner & 1 ? box.hi.x() : box.lo.x(), corner & 2 ? box.hi.y() : box.lo.y(), corner & 4 ? box.hi.z() : box.lo.z());
+    built.world_bounds.lo = built.world_bounds.lo.cwiseMin(to_world * p);
+    built.world_bounds.hi = built.world_bounds.hi.cwiseMax(to_world * p);
+  }
+  const std::uint64_t content = built.medium->content_hash();
+  built.hash = fnv1a({reinterpret_cast<const char*>(&content), sizeof content}, fnv1a(spec.label));
+  return built;
+}
+
+BuiltRays build_rays(const Component& spec, const BuiltMedium& medium) {
+  RaySet set = make_ray_set(spec)->rays(medium.world_bounds);
+  BuiltRays built{std::move(set.rays), {}, set.width, set.height};
+  const Affine to_local = medium.medium->world_to_local();
+  const Box bounds = medium.medium->bounds();
+  built.local.reserve(built.world.size());
+  for (Ray& ray : built.world) {
+    built.local.push_back(clipped(transformed(ray, to_local), bounds));
+    ray.begin = built.local.back().begin;
+    ray.end = built.local.back().end;
+  }
+  return built;
+}
+
+void sorted_knots(const Medium& medium, const Ray& local, std::vector<Real>& out) {
+  out.assign(1, local.begin);
+  if (!(local.length() > 0)) return;
+  medium.knots(local, out);
+  std::sort(out.begin() + 1, out.end());
+  out.push_back(local.end);
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+}
+
+DepthWithError optical_depth(const Medium& medium, const Ray& local) {
+  const int channels = medium.channels();
+  if (!(local.length() > 0)) return {Spectrum::Zero(channels), Spectrum::Zero(channels), "closed_form"};
+  if (const auto depth = medium.optical_depth(local)) {
+    return {*depth, Spectrum(64 * kEpsilon * *depth), "closed_form"};
+  }
+  std::vector<Real> knots;
+  sorted_knots(medium, local, knots);
+  const auto pieces = static_cast<Real>(knots.size() - 1);
+  std::array<Real, kMaxChannels> mu{};
+  const auto lookup = [&](Real t) {
+    const Vec3 p = local.at(t);
+    medium.extinction({&p.x(), &p.y(), &p.z(), 1}, mu.data());
+  };
+  if (const auto degree = medium.polynomial_degree()) {
+    Eigen::Array<long double, Eigen::Dynamic, 1, Eigen::DontAlign, kMaxChannels, 1> sum(channels);
+    sum.setZero();
+    const GaussRule& rule = gauss_rule(*degree);
+    for (std::size_t i = 0; i + 1 < knots.size(); ++i)
+      for (std::size_t point = 0; point < rule.point.size(); ++point) {
+        const Real width = knots[i + 1] - knots[i];
+        lookup(knots[i] + width * rule.point[point]);
+        for (int c = 0; c < channels; ++c)
+          sum[c] += static_cast<long double>(width * rule.weight[point]) * static_cast<long double>(mu[static_cast<std::size_t>(c)]);
+      }
+    const Spectrum depth = sum.cast<Real>();
+    return {depth, Spectrum(8 * kEpsilon * (1 + std::sqrt(pieces)) * depth), "exact_traversal"};
+  }
+  using Rule = boost::math::quadrature::gauss_kronrod<Real, 15>;
+  Spectrum depth = Spectrum::Zero(channels), error = Spectrum::Zero(channels);
+  for (int c = 0; c < channels; ++c) {
+    for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
+      Real piece_error = 0;
+      depth[c] += Rule::integrate(
+          [&](Real t) {
+            lookup(t);
+            return mu[static_cast<std::size_t>(c)];
+          },
+          knots[i], knots[i + 1], 10, 1e-13, &piece_error);
+      error[c] += piece_error;
+    }
+    error[c] += 8 * kEpsilon * pieces * depth[c];
+  }
+  return {depth, error, "quadrature"};
+}
+
+Reference compute_reference(const BuiltMedium& medium, const BuiltRays& rays) {
+  Reference reference;
+  reference.channels = medium.medium->channels();
+  const auto channels = static_cast<std::size_t>(reference.channels);
+  reference.depth.resize(rays.local.size() * channels);
+  reference.error.resize(rays.local.size() * channels);
+  std::vector<const char*> method(rays.local.size(), "closed_form");
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.local.size(), 16), [&](const auto& range) {
+    for (std::size_t r = range.begin(); r < range.end(); ++r) {
+      const DepthWithError result = optical_depth(*medium.medium, rays.local[r]);
+      for (std::size_t c = 0; c < channels; ++c) {
+        reference.depth[r * channels + c] = result.depth[static_cast<Eigen::Index>(c)];
+        reference.error[r * channels + c] = result.error[static_cast<Eigen::Index>(c)];
+      }
+      method[r] = result.method;
+    }
+  });
+  for (std::size_t r = 0; r < method.size(); ++r)
+    if (reference.method.empty() || rays.local[r].length() > 0) {
+      reference.method = method[r];
+      if (rays.local[r].length() > 0) break;
+    }
+  return reference;
+}
+
+void Scene::context(std::size_t ray, const Kernel& kernel, RayContext& out) const {
+  out.world = rays->world[ray];
+  out.local = rays->local[ray];
+  out.index = static_cast<std::uint32_t>(ray);
+  majorant->segments(out.world, out.local, out.segments);
+  out.knots.clear();
+  out.exact_depth.reset();
+  if (kernel.needs_knots()) sorted_knots(*medium->medium, out.local, out.knots);
+  if (kernel.needs_optical_depth()) out.exact_depth = optical_depth(*medium->medium, out.local).depth;
+}
+
+std::uint64_t stream_key(const Cell& cell, const BuiltMedium& medium) {
+  std::uint64_t key = fnv1a({reinterpret_cast<const char*>(&cell.seed), sizeof cell.seed}, medium.hash);
+  if (cell.own_streams) key = fnv1a(cell.estimator.label, key);
+  return key;
+}
+
+}  // namespace nullmark

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "harness/kernel.h"
+#include "harness/plan.h"
+#include "harness/ray_sets.h"
+
+namespace nullmark {
+
+/// A medium, built, with its extrema and what its random streams are keyed by.
+struct BuiltMedium {
+  std::shared_ptr<const Medium> medium;
+  Extrema extrema;
+  Box world_bounds;
+  std::uint64_t hash = 0;  ///< of the specification and of the data behind it
+};
+
+/// Builds a specification: the field, times its spectrum or one per channel.  Throws ParameterError or MissingData.
+BuiltMedium build_medium(const MediumSpec& spec);
+
+/// Rays of a set, cut to a medium, in both frames.
+struct BuiltRays {
+  std::vector<Ray> world, local;
+  int width = 0, height = 0;
+};
+BuiltRays build_rays(const Component& spec, const BuiltMedium& medium);
+
+/// Optical depth of every ray, per channel, with a bound on its error.
+struct Reference {
+  int channels = 1;
+  std::vector<Real> depth, error;  ///< [ray * channels + c]
+  std::string method;              ///< "closed_form", "exact_traversal" or "quadrature"
+
+  Spectrum at(std::size_t ray) const {
+    return Eigen::Map<const Spectrum>(&depth[ray * static_cast<std::size_t>(channels)], channels);
+  }
+};
+Reference compute_reference(const BuiltMedium& medium, const BuiltRays& rays);
+
+/// Optical depth of a local ray and its error bound: closed form, else exact traversal of a piecewise polynomial, else adaptive
+/// Gauss-Kronrod quadrature between knots.
+struct DepthWithError {
+  Spectrum depth, error;
+  const char* method;
+};
+DepthWithError optical_depth(const Medium& medium, const Ray& local);
+
+/// begin, the medium's knots in between, end; sorted, without repetitions.
+void sorted_knots(const Medium& medium, const Ray& local, std::vector<Real>& out);
+
+/// What one cell samples from: shared by all cells of the same medium, majorant and rays.
+struct Scene {
+  std::shared_ptr<const BuiltMedium> medium;
+  std::shared_ptr<const MajorantStructure> majorant;
+  std::shared_ptr<const BuiltRays> rays;
+  std::shared_ptr<const Reference> reference;
+
+  /// Fills the context of a ray with what the kernel needs.
+  void context(std::size_t ray, const Kernel& kernel, RayContext& out) const;
+};
+
+/// Key of the random streams: the same for all estimators of a medium and seed, unless the cell asks for streams of its own.
+std::uint64_t stream_key(const Cell& cell, const BuiltMedium& medium);
+
+}  // namespace nullmark

@@ -1,0 +1,104 @@
+#include "harness/spec_json.h"
+
+#include <fmt/format.h>
+
+#include "harness/hash.h"
+#include "harness/names.h"
+
+namespace nullmark {
+namespace {
+
+std::string hexadecimal(std::uint64_t hash) { return fmt::format("{:016x}", hash); }
+
+void add_samples(Json& json, const Cell& cell) {
+  if (cell.equal_lookups)
+    json["equal_lookups"] = *cell.equal_lookups;
+  else
+    json["samples_per_ray"] = cell.samples_per_ray;
+}
+
+/// The keys that decide the statistics.
+Json deciding_json(const Plan& plan, const Cell& cell) {
+  Json json = {{"estimator", component_json(cell.estimator)},
+               {"medium", medium_json(plan.media[cell.medium])},
+               {"majorant", component_json(plan.majorants[cell.majorant])},
+               {"rays", component_json(plan.ray_sets[cell.rays])},
+               {"quantity", to_string(cell.quantity)},
+               {"measurement", measurement_json(cell.measurement)}};
+  add_samples(json, cell);
+  json["seed"] = cell.seed;
+  json["own_streams"] = cell.own_streams;
+  return json;
+}
+
+Json tables_json(const std::vector<Table>& tables) {
+  Json list = Json::array();
+  for (const Table& table : tables) {
+    Json rows = Json::array();
+    for (const TableRow& row : table.rows) {
+      Json entry = {{"label", row.label}, {"given", Json::object()}, {"cells", Json::object()}};
+      for (const auto& [heading, number] : row.given) entry["given"][heading] = number;
+      for (const auto& [heading, cell] : row.cells) entry["cells"][heading] = {{"cell", cell}};
+      if (row.theory_of) entry["theory"] = {{"cell", *row.theory_of}};
+      if (!row.note.empty()) entry["note"] = row.note;
+      rows.push_back(std::move(entry));
+    }
+    list.push_back({{"title", table.title}, {"metric", table.metric}, {"rows", std::move(rows)}});
+  }
+  return list;
+}
+
+}  // namespace
+
+Json parameters_json(const ParameterValues& values) {
+  Json json = Json::object();
+  for (const auto& [name, value] : values)
+    std::visit([&, &key = name](const auto& held) { json[key] = held; }, value);
+  return json;
+}
+
+Json component_json(const Component& component) {
+  Json json = {{"type", component.type}};
+  json.update(parameters_json(component.values));
+  return json;
+}
+
+Json medium_json(const MediumSpec& medium) {
+  Json json = component_json(medium.field);
+  if (!medium.spectrum.empty()) json["spectrum"] = medium.spectrum;
+  for (const MediumSpec& channel : medium.per_channel) json["media"].push_back(medium_json(channel));
+  return json;
+}
+
+Json measurement_json(const Measurement& measurement) {
+  return {{"clamp", measurement.clamp}, {"quantise_bits", measurement.quantise_bits}};
+}
+
+std::string cell_id(const Plan& plan, const Cell& cell) { return hexadecimal(fnv1a(deciding_json(plan, cell).dump())); }
+
+std::string applied_config(const Plan& plan) {
+  Json experiments = Json::array();
+  for (const Cell& cell : plan.cells) {
+    if (experiments.empty() || experiments.back()["name"] != cell.experiment)
+      experiments.push_back({{"name", cell.experiment}, {"include", Json::array()}});
+    Json entry = deciding_json(plan, cell);
+    if (plan.media[cell.medium].optional) entry["medium"]["optional"] = true;
+    entry["images"] = cell.images;
+    entry["image_maximum"] = cell.image_maximum;
+    experiments.back()["include"].push_back(std::move(entry));
+  }
+  const Json json = {{"$schema", kConfigSchema},
+                     {"name", plan.name},
+                     {"timing",
+                      {{"enabled", plan.timing.enabled},
+                       {"repetitions", plan.timing.repetitions},
+                       {"seconds", plan.timing.seconds},
+                       {"samples_per_traversal", plan.timing.samples_per_traversal}}},
+                     {"experiments", std::move(experiments)},
+                     {"tables", tables_json(plan.tables)}};
+  return json.dump();
+}
+
+std::string config_hash(const std::string& config_text) { return hexadecimal(fnv1a(config_text)); }
+
+}  // namespace nullmark

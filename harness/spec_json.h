@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+
+#include "harness/json_input.h"
+#include "harness/parameter_values.h"
+#include "harness/plan.h"
+
+namespace nullmark {
+
+inline constexpr const char* kConfigSchema = "nullmark/config/1";
+
+/// Parts of a plan as a configuration writes them, complete: every parameter stands there.
+Json parameters_json(const ParameterValues& values);
+Json component_json(const Component& component);
+Json medium_json(const MediumSpec& medium);
+Json measurement_json(const Measurement& measurement);
+
+/// What decides a cell's statistics, as canonical text, hashed to 16 hexadecimal digits.
+std::string cell_id(const Plan& plan, const Cell& cell);
+
+/// The plan as a configuration that names every cell explicitly; reading it gives the same plan.  One line, canonical.
+std::string applied_config(const Plan& plan);
+
+/// 16 hexadecimal digits; equal for equal plans.
+std::string config_hash(const std::string& config_text);
+
+}  // namespace nullmark

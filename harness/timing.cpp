@@ -1,0 +1,174 @@
+#include "harness/timing.h"
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <map>
+
+#include "harness/calibration.h"
+
+namespace nullmark {
+namespace {
+
+constexpr std::size_t kRays = 64;  ///< at most this many, spread evenly over the cell's
+
+Real median(std::vector<Real> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return (*middle + *std::max_element(values.begin(), middle)) / 2;
+}
+
+std::vector<std::size_t> timed_rays(const BuiltRays& rays) {
+  std::vector<std::size_t> hits, chosen;
+  for (std::size_t r = 0; r < rays.local.size(); ++r)
+    if (rays.local[r].length() > 0) hits.push_back(r);
+  const std::size_t count = std::min(kRays, hits.size());
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(hits[(2 * i + 1) * hits.size() / (2 * count)]);
+  return chosen;
+}
+
+/// Nanoseconds and lookups of one repetition.
+struct Repetition {
+  Real ns_per_iteration = 0, samples = 0, lookups = 0;
+};
+
+class Collector final : public benchmark::BenchmarkReporter {
+ public:
+  Collector(const std::function<void(double)>& progress, std::size_t expected) : progress_(progress), expected_(expected) {}
+
+  bool ReportContext(const Context&) override { return true; }
+
+  void ReportRuns(const std::vector<Run>& runs) override {
+    for (const Run& run : runs) {
+      if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
+      const auto iterations = static_cast<Real>(run.iterations);
+      all[run.run_name.function_name].push_back({run.real_accumulated_time / iterations * 1e9,
+                                                 run.counters.at("samples") / iterations, run.counters.at("lookups") / iterations});
+      progress_(static_cast<double>(++seen_) / static_cast<double>(expected_));
+    }
+  }
+
+  std::map<std::string, std::vector<Repetition>> all;
+
+ private:
+  std::function<void(double)> progress_;
+  std::size_t expected_, seen_ = 0;
+};
+
+/// Samples a cell's rays over and over; every iteration takes new samples, so that no branch pattern is learnt by heart.
+void run_cell(benchmark::State& state, const TimedCell& timed, const std::vector<std::size_t>& rays, std::uint64_t samples,
+              const std::function<bool()>& stop) {
+  const std::uint64_t key = stream_key(*timed.cell, *timed.scene->medium);
+  const Medium& medium = *timed.scene->medium->medium;
+  const auto workspace = timed.kernel->workspace();
+  RayContext context;
+  SampleBlock block;
+  Counters counters;
+  std::uint64_t first = 0;
+  if (stop()) {
+    state.SkipWithError("interrupted");
+    return;
+  }
+  for ([[maybe_unused]] auto _ : state) {
+    for (const std::size_t ray : rays) {
+      timed.scene->context(ray, *timed.kernel, context);
+      timed.kernel->begin_ray(*workspace, medium, timed.scene->medium->extrema, context);
+      timed.kernel->sample(*workspace, medium, context, key, first, samples, timed.cell->quantity, block, counters);
+      benchmark::DoNotOptimize(block.values.data());
+      benchmark::ClobberMemory();
+    }
+    first += samples;
+  }
+  state.counters["samples"] = static_cast<double>(counters.samples);
+  state.counters["lookups"] = static_cast<double>(counters.lookups);
+}
+
+}  // namespace
+
+std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& plan,
+                                                  const std::function<bool()>& stop, const std::function<void(double)>& progress) {
+  static const bool initialised = [] {
+    char name[] = "nullmark", interleave[] = "--benchmark_enable_random_interleaving=true";
+    char* arguments[] = {name, interleave, nullptr};
+    int count = 2;
+    benchmark::Initialize(&count, arguments);
+    return true;
+  }();
+  (void)initialised;
+
+  std::vector<std::optional<TimeRecord>> result(cells.size());
+  if (cells.empty()) return result;
+  const auto configure = [&](benchmark::internal::Benchmark* bench) {
+    bench->Repetitions(plan.repetitions)->MinTime(plan.seconds)->UseRealTime()->Unit(benchmark::kNanosecond);
+  };
+  const std::string floor_name = "floor", loop_name = "loop";
+  configure(benchmark::RegisterBenchmark(floor_name.c_str(), [](benchmark::State& state) {
+    PlainRng rng(1);
+    constexpr std::uint64_t kSteps = 4096;
+    Real rate = 0.2;
+    for ([[maybe_unused]] auto _ : state) {
+      benchmark::DoNotOptimize(rate);
+      benchmark::DoNotOptimize(floor_loop(rng, rate, kSteps));
+    }
+    state.counters["samples"] = static_cast<double>(state.iterations());
+    state.counters["lookups"] = static_cast<double>(static_cast<std::uint64_t>(state.iterations()) * kSteps);
+  }));
+  configure(benchmark::RegisterBenchmark(loop_name.c_str(), [](benchmark::State& state) {
+    PlainRng rng(2);
+    std::uint64_t lookups = 0, samples = 0;
+    Real majorant = 30, extinction = 15;
+    for ([[maybe_unused]] auto _ : state) {
+      benchmark::DoNotOptimize(majorant);
+      benchmark::DoNotOptimize(extinction);
+      for (int i = 0; i < 128; ++i) {
+        benchmark::DoNotOptimize(plain_ratio_loop(rng, majorant, [&](Real) { return extinction; }, lookups));
+        ++samples;
+      }
+    }
+    state.counters["samples"] = static_cast<double>(samples);
+    state.counters["lookups"] = static_cast<double>(lookups);
+  }));
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::vector<std::size_t> rays = timed_rays(*cells[i].scene->rays);
+    if (rays.empty()) continue;
+    configure(benchmark::RegisterBenchmark(std::to_string(i).c_str(), [&cells, &plan, &stop, rays, i](benchmark::State& state) {
+      run_cell(state, cells[i], rays, plan.samples_per_traversal, stop);
+    }));
+  }
+  Collector collector(progress, (cells.size() + 2) * static_cast<std::size_t>(plan.repetitions));
+  benchmark::RunSpecifiedBenchmarks(&collector);
+  benchmark::ClearRegisteredBenchmarks();
+
+  const auto per_lookup = [&](const std::string& name) {
+    std::vector<Real> ns;
+    for (const Repetition& repetition : collector.all[name]) ns.push_back(repetition.ns_per_iteration / repetition.lookups);
+    return ns.empty() ? 0 : median(ns);
+  };
+  const Real floor = per_lookup(floor_name), loop = per_lookup(loop_name);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::vector<Repetition>& repetitions = collector.all[std::to_string(i)];
+    if (repetitions.size() != static_cast<std::size_t>(plan.repetitions)) continue;
+    TimeRecord time;
+    std::vector<Real> lookup_ns;
+    for (const Repetition& repetition : repetitions) {
+      time.repetition_ns.push_back(repetition.ns_per_iteration / repetition.samples);
+      if (repetition.lookups > 0) lookup_ns.push_back(repetition.ns_per_iteration / repetition.lookups);
+    }
+    time.ns_per_sample = median(time.repetition_ns);
+    std::vector<Real> deviation;
+    for (const Real ns : time.repetition_ns) deviation.push_back(std::abs(ns - time.ns_per_sample));
+    time.mad = median(deviation);
+    if (!lookup_ns.empty()) {
+      time.ns_per_lookup = median(lookup_ns);
+      time.floor_ratio = floor > 0 ? time.ns_per_lookup / floor : 0;
+      time.loop_ratio = loop > 0 ? time.ns_per_lookup / loop : 0;
+    }
+    time.repetitions = plan.repetitions;
+    time.samples_per_traversal = plan.samples_per_traversal;
+    result[i] = time;
+  }
+  return result;
+}
+
+}  // namespace nullmark

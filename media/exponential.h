@@ -1,0 +1,36 @@
+#pragma once
+
+#include "media/along_axis.h"
+
+namespace nullmark {
+
+/// f(s) = amplitude e^(rate s), 1/length, with s in [0,1] along the axis: rate is per axis, not per world length, so the
+/// extinction changes by e^rate from the lower face to the upper one whatever the size of the box.  Rate 0 is constant.
+struct ExponentialProfile {
+  static constexpr const char* kName = "exponential";
+  static constexpr const char* kSummary = "extinction growing or decaying exponentially along an axis";
+  static constexpr const char* kSource = "theory.md section 3.3, the field of the marching orders";
+
+  Real amplitude = 3, rate = -3;
+
+  void parameters(ParameterVisitor& visit) {
+    visit.number("amplitude", amplitude, Range::non_negative(), "1/length", "extinction at the lower face");
+    visit.number("rate", rate, Range::between(-700, 700), "", "logarithm of the ratio of upper to lower face");
+  }
+
+  Real value(Real s) const { return amplitude * std::exp(rate * s); }
+
+  Real integral(Real a, Real b) const {
+    const Real growth = rate * (b - a);
+    return growth == 0 ? (b - a) * value(a) : (b - a) * value(a) * (std::expm1(growth) / growth);
+  }
+
+  std::pair<Real, Real> extrema(Real a, Real b) const {
+    const std::pair<Real, Real> ends = std::minmax({value(a), value(b)});
+    return rate == 0 ? ends : outward(ends);
+  }
+};
+
+using Exponential = AlongAxis<ExponentialProfile>;
+
+}  // namespace nullmark

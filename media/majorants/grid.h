@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+
+#include "media/registry.h"
+
+namespace nullmark {
+
+/// A regular grid of bounds over the medium's local box, walked by 3D-DDA [Amanatides and Woo 1987; Szirmay-Kalos, Toth, Magdics 2011].  Each cell
+/// holds the extrema of the extinction inside it, for trilinear volumes over the whole filter footprint (the medium's `extrema` sees to that).
+class GridMajorant final : public MajorantStructure {
+ public:
+  GridMajorant(const Medium& medium, const std::array<int, 3>& resolution, Real looseness);
+
+  void segments(const Ray& world, const Ray& local, SegmentBuffer& out) const override;
+
+ private:
+  const Extrema& cell(const std::array<int, 3>& at) const {
+    return cells_[static_cast<std::size_t>((at[2] * resolution_[1] + at[1]) * resolution_[0] + at[0])];
+  }
+
+  std::array<int, 3> resolution_;
+  Real looseness_, diagonal_ = 0;
+  Box box_;
+  std::vector<Extrema> cells_;
+};
+
+struct GridMajorantSource final : MajorantSource {
+  static constexpr const char* kName = "grid";
+  static constexpr const char* kSummary = "a regular grid of bounds, walked by 3D-DDA";
+  static constexpr const char* kSource = "Amanatides and Woo 1987; Szirmay-Kalos, Toth, Magdics 2011";
+
+  int resolution = 16, resolution_y = 0, resolution_z = 0;
+  Real looseness = 1;
+
+  void parameters(ParameterVisitor& visit) override {
+    visit.integer("resolution", resolution, 1, 512, "cells along x, and along the other axes where they are not given");
+    visit.integer("resolution_y", resolution_y, 0, 512, "cells along y; 0: as along x");
+    visit.integer("resolution_z", resolution_z, 0, 512, "cells along z; 0: as along x");
+    visit.number("looseness", looseness, Range::positive(), "", "majorant over least bound; below 1 the majorant is violated");
+  }
+  std::unique_ptr<const MajorantStructure> build(std::shared_ptr<const Medium> medium) const override {
+    return std::make_unique<GridMajorant>(
+        *medium, std::array{resolution, resolution_y ? resolution_y : resolution, resolution_z ? resolution_z : resolution},
+        looseness);
+  }
+};
+
+}  // namespace nullmark

@@ -1,0 +1,11 @@
+#include "media/majorants/global.h"
+#include "media/majorants/grid.h"
+#include "media/majorants/prescribed.h"
+
+namespace nullmark {
+
+NULLMARK_REGISTER_MAJORANT(GlobalMajorantSource);
+NULLMARK_REGISTER_MAJORANT(GridMajorantSource);
+NULLMARK_REGISTER_MAJORANT(PrescribedMajorantSource);
+
+}  // namespace nullmark
