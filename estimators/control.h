@@ -12,7 +12,8 @@ namespace nullmark {
 ///   minimum, average, middle, maximum   of the segment's bounds (one segment: of the medium; a grid: of each super-voxel)
 ///   medium_average                      over the whole medium
 ///   ray_average                         tau/d, from the medium's own closed form or exact traversal
-///   gamma                               min + mubr (gamma^{1/(D mubr)} - 1), cut to [min, average], with mubr = max(max - min, floor) and D
+///   gamma                               min + mubr (gamma^{1/(D mubr)} - 1), cut to [min, average], with mubr = max(max - min,
+///   floor) and D
 ///                                       the super-voxel's diagonal [Novák et al. 2014, Sec. 5.1; derived from its purpose]
 ///   given                               `value`
 ///   linear, exponential                 from `value` at the ray's begin to `value_end` at its end
@@ -31,12 +32,16 @@ struct ControlChoice {
   }
 
   void parameters(ParameterVisitor& visit) {
-    visit.choice("control", kind,
-                 {"minimum", "average", "middle", "maximum", "medium_average", "ray_average", "gamma", "given", "linear", "exponential"},
-                 "control extinction: of the segment's bounds, of the medium or the ray, by the gamma rule, or given");
-    visit.number("value", value, Range::non_negative(), "1/length", "control extinction (given), or at the ray's begin (linear, exponential)");
-    visit.number("value_end", value_end, Range::non_negative(), "1/length", "control extinction at the ray's end (linear, exponential)");
-    visit.number("gamma", gamma, {1, 1e6, true}, "", "bound of the residual estimate at the expected number of collisions (gamma)");
+    visit.choice(
+        "control", kind,
+        {"minimum", "average", "middle", "maximum", "medium_average", "ray_average", "gamma", "given", "linear", "exponential"},
+        "control extinction: of the segment's bounds, of the medium or the ray, by the gamma rule, or given");
+    visit.number("value", value, Range::non_negative(), "1/length",
+                 "control extinction (given), or at the ray's begin (linear, exponential)");
+    visit.number("value_end", value_end, Range::non_negative(), "1/length",
+                 "control extinction at the ray's end (linear, exponential)");
+    visit.number("gamma", gamma, {1, 1e6, true}, "",
+                 "bound of the residual estimate at the expected number of collisions (gamma)");
     rate_parameters(visit);
   }
 
@@ -48,7 +53,8 @@ template <class Value>
 struct Control {
   std::vector<Value> of_segment;  ///< constant in each segment; unused for profiles
   bool linear = false, exponential_profile = false;
-  Real begin = 0, length = 0, first = 0, growth = 0;  ///< profile: first + growth s, or first e^{growth s}, s = (t - begin)/length
+  Real begin = 0, length = 0, first = 0,
+       growth = 0;  ///< profile: first + growth s, or first e^{growth s}, s = (t - begin)/length
   int channels = 1;
   Value depth;  ///< tau_c over the ray
 

@@ -5,9 +5,9 @@
 
 namespace nullmark {
 
-/// Delta tracking, 1 where the walk escapes [Woodcock et al. 1965; Coleman 1968].  Needs mub >= mu.  Binary, Var = T (1 - T), lookups
-/// int mub(x) T(0,x) dx.  On chromatic media the channels either share one walk at the largest channel's majorant, each comparing the
-/// same random number, until all are dead; or every channel walks for itself at its own majorant.
+/// Delta tracking, 1 where the walk escapes [Woodcock et al. 1965; Coleman 1968].  Needs mub >= mu.  Binary, Var = T (1 - T),
+/// lookups int mub(x) T(0,x) dx.  On chromatic media the channels either share one walk at the largest channel's majorant, each
+/// comparing the same random number, until all are dead; or every channel walks for itself at its own majorant.
 template <class Value>
 struct DeltaTracking {
   static constexpr const char* kName = "delta";

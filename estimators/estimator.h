@@ -13,8 +13,8 @@
 
 namespace nullmark {
 
-/// What an estimator says of its mean.  `exact`: no variance, error of rounding only.  `unbiased`: mean T (or tau) for any sample count.
-/// `consistent`: bias vanishes with the step.  `biased`: neither; registered for comparison.
+/// What an estimator says of its mean.  `exact`: no variance, error of rounding only.  `unbiased`: mean T (or tau) for any sample
+/// count. `consistent`: bias vanishes with the step.  `biased`: neither; registered for comparison.
 enum class Claim { exact, unbiased, consistent, biased };
 
 /// Values one sample can take, when the majorant bounds the extinction.
@@ -61,14 +61,14 @@ struct Passage {
 // and where it has them
 //
 //   void parameters(ParameterVisitor&)
-//   using Ray = ...; void prepare(Ray&) const     per-ray data of its own, derived from Passage<Value>; default Ray = Passage<Value>
-//   Value optical_depth(const Walk&, const Ray&) const             answers Quantity::optical_depth as well
-//   int real_collisions(const Walk&, const Ray&) const             tentative collisions that ended a walk; default 0
-//   static constexpr bool kIgnoresMajorant                         lookups are no tentative collisions: neither audited nor counted as such
-//   static constexpr bool kNeedsOpticalDepth, kNeedsKnots          asks the harness to fill exact_depth, knots
-//   Value expected(const Value& tau, const Ray&) const             target other than exp(-tau), e.g. a factor of T
-//   Theory theory(const Ray&, const RayProfile&, int channel, Quantity) const
-//   void check(const Extrema& medium) const       throws ParameterError for parameters that do not fit the medium
+//   using Ray = ...; void prepare(Ray&) const     per-ray data of its own, derived from Passage<Value>; default Ray =
+//   Passage<Value> Value optical_depth(const Walk&, const Ray&) const             answers Quantity::optical_depth as well int
+//   real_collisions(const Walk&, const Ray&) const             tentative collisions that ended a walk; default 0 static constexpr
+//   bool kIgnoresMajorant                         lookups are no tentative collisions: neither audited nor counted as such static
+//   constexpr bool kNeedsOpticalDepth, kNeedsKnots          asks the harness to fill exact_depth, knots Value expected(const
+//   Value& tau, const Ray&) const             target other than exp(-tau), e.g. a factor of T Theory theory(const Ray&, const
+//   RayProfile&, int channel, Quantity) const void check(const Extrema& medium) const       throws ParameterError for parameters
+//   that do not fit the medium
 //
 // The loop, the counting, the majorant audit and the random streams are the harness's.
 

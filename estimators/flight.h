@@ -46,8 +46,9 @@ class Rates {
 };
 
 /// Where a walk is on its ray.  Flights live in majorant depth: the next tentative collision lies one unit exponential of depth
-/// ahead, whatever cells are crossed, so a collision costs one logarithm and a crossing none.  That equals cutting the flight at each
-/// cell and starting anew, because the exponential has no memory [Yue et al. 2010, Sec. 3].  Cells of rate 0 are passed over.
+/// ahead, whatever cells are crossed, so a collision costs one logarithm and a crossing none.  That equals cutting the flight at
+/// each cell and starting anew, because the exponential has no memory [Yue et al. 2010, Sec. 3].  Cells of rate 0 are passed
+/// over.
 class Flight {
  public:
   void start(const Rates& rates) {

@@ -15,8 +15,8 @@ struct GaussRule {
   int size() const { return static_cast<int>(point.size()); }
 };
 
-/// The rule with the fewest points that is exact for a polynomial of the degree (up to kMostDegree): degree/2 + 1, so 1 up to linear and 2 up
-/// to cubic.
+/// The rule with the fewest points that is exact for a polynomial of the degree (up to kMostDegree): degree/2 + 1, so 1 up to
+/// linear and 2 up to cubic.
 inline constexpr int kMostDegree = 79;
 
 inline const GaussRule& gauss_rule(int degree) {

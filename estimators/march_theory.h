@@ -5,8 +5,8 @@
 namespace nullmark {
 
 // Exact mean and variance of a march of k steps on one ray, by one-dimensional quadrature over its offsets.  With m_j the mean of
-// e^{s h mu} over stratum j, the stratified march has E e^{sX} = prod_j m_j(s); the uniform one is a single integral over the common
-// offset.  s = -1, -2 give the moments of T; for tau itself the first two moments of h mu are used.
+// e^{s h mu} over stratum j, the stratified march has E e^{sX} = prod_j m_j(s); the uniform one is a single integral over the
+// common offset.  s = -1, -2 give the moments of T; for tau itself the first two moments of h mu are used.
 
 Theory fixed_march(const RayProfile& profile, int c, int steps, Real offset, Quantity quantity);
 Theory stratified_march(const RayProfile& profile, int c, int steps, Quantity quantity);

@@ -4,7 +4,8 @@
 
 namespace nullmark {
 
-/// Second moment of the next-flight family over local majorants, with v(y) = exp(-int_y^d mub), a = 1 - mu/mub and G = 2 v T(y,d) - v^2:
+/// Second moment of the next-flight family over local majorants, with v(y) = exp(-int_y^d mub), a = 1 - mu/mub and G = 2 v T(y,d)
+/// - v^2:
 ///   M2 = G(0) + int_0^d mub gain(a) k G dy,
 /// k(y) = T(0,y) where the walk is killed, exp(-int_0^y (2 mu - mu^2/mub)) where it carries its weight [Novák et al. 2018; the
 /// integral equation of the second moment for a history-free walk].  Nothing where the panels do not resolve v.

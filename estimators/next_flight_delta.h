@@ -5,13 +5,15 @@
 
 namespace nullmark {
 
-/// Next-flight delta tracking [Novák et al. 2018, STAR].  Variant A adds (1 - p) e^{-mub left} at EVERY tentative collision, the real one
-/// included (without that last term the estimate is too low); variant B adds e^{-mub left} at null collisions only.  p = mu/mub.  Both
-/// unbiased for mub >= mu, in (0, inf), Var(A) <= Var(B).  Lookups as delta tracking.  Channels share one walk and one random number.
+/// Next-flight delta tracking [Novák et al. 2018, STAR].  Variant A adds (1 - p) e^{-mub left} at EVERY tentative collision, the
+/// real one included (without that last term the estimate is too low); variant B adds e^{-mub left} at null collisions only.  p =
+/// mu/mub.  Both unbiased for mub >= mu, in (0, inf), Var(A) <= Var(B).  Lookups as delta tracking.  Channels share one walk and
+/// one random number.
 template <class Value>
 struct NextFlightDeltaTracking {
   static constexpr const char* kName = "next_flight_delta";
-  static constexpr const char* kSummary = "next-flight delta tracking: expected escape from every tentative collision until a real one";
+  static constexpr const char* kSummary =
+      "next-flight delta tracking: expected escape from every tentative collision until a real one";
   static constexpr const char* kSource = "Novak, Georgiev, Hanika, Jarosz 2018";
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = true;

@@ -4,8 +4,8 @@
 
 namespace nullmark {
 
-/// Next-flight ratio tracking [Novák et al. 2018, STAR; Georgiev et al. 2019]: every tentative collision adds the chance that the flight
-/// from there escapes the majorant.  Unbiased for any rate; (0, inf) where it bounds.  Lookups int mub.
+/// Next-flight ratio tracking [Novák et al. 2018, STAR; Georgiev et al. 2019]: every tentative collision adds the chance that the
+/// flight from there escapes the majorant.  Unbiased for any rate; (0, inf) where it bounds.  Lookups int mub.
 template <class Value>
 struct NextFlightRatioTracking {
   static constexpr const char* kName = "next_flight_ratio";

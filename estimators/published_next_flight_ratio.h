@@ -5,8 +5,8 @@
 namespace nullmark {
 
 /// Next-flight ratio tracking with the step law of the program behind Kozelj's comparison: flights are -log(1 - u/mub) instead of
-/// -log(1 - u)/mub (a misplaced parenthesis).  Steps are bounded and half as long, collisions twice as many, and the mean is wrong.  Needs
-/// mub > 1 in the units of the scene.
+/// -log(1 - u)/mub (a misplaced parenthesis).  Steps are bounded and half as long, collisions twice as many, and the mean is
+/// wrong.  Needs mub > 1 in the units of the scene.
 template <class Value>
 struct PublishedNextFlightRatioTracking : NextFlightRatioTracking<Value> {
   static constexpr const char* kName = "next_flight_ratio_published_step";

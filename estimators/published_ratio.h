@@ -6,11 +6,11 @@
 
 namespace nullmark {
 
-/// Ratio tracking as the program behind Kozelj's comparison ran it: its random numbers are a hash of position, collision count and frame time,
-/// in single precision,
+/// Ratio tracking as the program behind Kozelj's comparison ran it: its random numbers are a hash of position, collision count
+/// and frame time, in single precision,
 ///   p = frac(10.31 (x + i + time)),  p += dot(p, p.zyx + 31.32),  u = frac((p.x + p.y) p.z 20),
-/// with x the ray's entry less one half, i from 0, and frame k (one sample) at time 1 + .31 k (the frame times were not recorded).  Biased by
-/// the hash; registered to show what that does to the published table.
+/// with x the ray's entry less one half, i from 0, and frame k (one sample) at time 1 + .31 k (the frame times were not
+/// recorded).  Biased by the hash; registered to show what that does to the published table.
 template <class Value>
 struct PublishedRatioTracking {
   static constexpr const char* kName = "ratio_published_hash";

@@ -1,8 +1,7 @@
-#include "estimators/ratio.h"
-
 #include <benchmark/benchmark.h>
 
 #include "estimators/delta.h"
+#include "estimators/ratio.h"
 #include "harness/bench_kernel.h"
 #include "harness/calibration.h"
 #include "media/gaussian_bump.h"

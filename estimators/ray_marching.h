@@ -5,9 +5,10 @@
 
 namespace nullmark {
 
-/// Ray marching with k = `steps` lookups at x_j = (j + o_j) h, h = d/k: tau = h sum_j mu(x_j), T = exp(-tau) [Perlin and Hoffert 1989; Pauly,
-/// Kollig, Keller 2000 for the stratified form].  Offsets: left 0, midpoint 1/2, right 1 (the seed's), uniform one u for all steps, stratified a
-/// fresh u for each.  The jittered forms are unbiased for tau; all are consistent for T, with bias T Var(tau)/2 at first order.
+/// Ray marching with k = `steps` lookups at x_j = (j + o_j) h, h = d/k: tau = h sum_j mu(x_j), T = exp(-tau) [Perlin and Hoffert
+/// 1989; Pauly, Kollig, Keller 2000 for the stratified form].  Offsets: left 0, midpoint 1/2, right 1 (the seed's), uniform one u
+/// for all steps, stratified a fresh u for each.  The jittered forms are unbiased for tau; all are consistent for T, with bias T
+/// Var(tau)/2 at first order.
 template <class Value>
 struct RayMarching {
   static constexpr const char* kName = "ray_marching";

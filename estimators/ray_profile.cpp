@@ -13,7 +13,8 @@ constexpr int kNodes = RayProfile::kNodes;
 constexpr Real kPanelDepth = 2;
 constexpr std::size_t kMaxPanels = 16384;
 
-/// Gauss-Legendre rule on [0, 1] with the matrix A of running integrals: int_0^{x_i} f = sum_j A_ij f(x_j), exact to degree kNodes - 1.
+/// Gauss-Legendre rule on [0, 1] with the matrix A of running integrals: int_0^{x_i} f = sum_j A_ij f(x_j), exact to degree
+/// kNodes - 1.
 struct Rule {
   std::array<Real, kNodes> x{}, w{};
   Eigen::Matrix<Real, kNodes, kNodes> running;
@@ -35,8 +36,8 @@ struct Rule {
       const Real y = 2 * x[static_cast<std::size_t>(i)] - 1;
       for (int n = 0; n < kNodes; ++n) {
         values(i, n) = boost::math::legendre_p(n, y);
-        integrals(i, n) = n == 0 ? (y + 1) / 2
-                                 : (boost::math::legendre_p(n + 1, y) - boost::math::legendre_p(n - 1, y)) / (2 * (2 * n + 1));
+        integrals(i, n) =
+            n == 0 ? (y + 1) / 2 : (boost::math::legendre_p(n + 1, y) - boost::math::legendre_p(n - 1, y)) / (2 * (2 * n + 1));
       }
     }
     running = integrals * values.inverse();

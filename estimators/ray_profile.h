@@ -10,26 +10,27 @@
 
 namespace nullmark {
 
-/// The extinction along one ray, sampled so that one-dimensional integrals of it, of the running optical depth and of piecewise constant
-/// rates are exact to quadrature error: Gauss-Legendre nodes on panels that are cut at the medium's knots and at segment ends, and finely
-/// enough that no panel is deeper than a few units of the majorant.
+/// The extinction along one ray, sampled so that one-dimensional integrals of it, of the running optical depth and of piecewise
+/// constant rates are exact to quadrature error: Gauss-Legendre nodes on panels that are cut at the medium's knots and at segment
+/// ends, and finely enough that no panel is deeper than a few units of the majorant.
 class RayProfile {
  public:
   static constexpr int kNodes = 8;  ///< per panel
 
   struct Node {
-    Real t;              ///< distance, length
-    Real weight;         ///< quadrature weight, length
-    std::size_t piece;   ///< segment that holds it
-    Real extinction;     ///< mu_c(t)
-    Real depth;          ///< int_begin^t mu_c
+    Real t;             ///< distance, length
+    Real weight;        ///< quadrature weight, length
+    std::size_t piece;  ///< segment that holds it
+    Real extinction;    ///< mu_c(t)
+    Real depth;         ///< int_begin^t mu_c
   };
 
   /// Evaluates the medium at `count` distances; out[i * channels + c].
   using Lookup = std::function<void(const Real* t, std::size_t count, Real* out)>;
 
-  /// `cuts`: sorted, first = begin, last = end.  `pieces`: ends of the segments.  A panel holds at most `panel_depth` of majorant depth and
-  /// there are at most `max_panels`; where that does not suffice, `resolved()` is false and sharply peaked integrals must not be trusted.
+  /// `cuts`: sorted, first = begin, last = end.  `pieces`: ends of the segments.  A panel holds at most `panel_depth` of majorant
+  /// depth and there are at most `max_panels`; where that does not suffice, `resolved()` is false and sharply peaked integrals
+  /// must not be trusted.
   RayProfile(const Lookup& lookup, int channels, std::span<const Real> cuts, std::span<const Real> piece_ends,
              std::span<const Real> piece_rates);
 

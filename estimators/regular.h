@@ -5,9 +5,9 @@
 
 namespace nullmark {
 
-/// Regular tracking: exact traversal from knot to knot [Amanatides and Woo 1987].  The extinction of the media that allow it is a polynomial
-/// of the distance between neighbouring knots; degree/2 + 1 Gauss points integrate it exactly (trilinear voxels: a cubic, two points), so
-/// only rounding is left.  Lookups = pieces * (degree/2 + 1).
+/// Regular tracking: exact traversal from knot to knot [Amanatides and Woo 1987].  The extinction of the media that allow it is a
+/// polynomial of the distance between neighbouring knots; degree/2 + 1 Gauss points integrate it exactly (trilinear voxels: a
+/// cubic, two points), so only rounding is left.  Lookups = pieces * (degree/2 + 1).
 template <class Value>
 struct RegularTracking {
   static constexpr const char* kName = "regular";

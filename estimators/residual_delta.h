@@ -5,8 +5,8 @@
 
 namespace nullmark {
 
-/// Residual delta tracking: T_c times a delta estimate of T_r [Novák, Selle, Jarosz 2014, Sec. 4].  The control must not exceed the
-/// extinction.  Values {0, T_c}, Var = T (T_c - T), lookups int mubr exp(-int_0^x (mu - mu_c)).  Channels share one walk.
+/// Residual delta tracking: T_c times a delta estimate of T_r [Novák, Selle, Jarosz 2014, Sec. 4].  The control must not exceed
+/// the extinction.  Values {0, T_c}, Var = T (T_c - T), lookups int mubr exp(-int_0^x (mu - mu_c)).  Channels share one walk.
 template <class Value>
 struct ResidualDeltaTracking {
   static constexpr const char* kName = "residual_delta";
@@ -19,7 +19,8 @@ struct ResidualDeltaTracking {
 
   void parameters(ParameterVisitor& visit) {
     visit.choice("control", choice.kind, {"minimum", "given"}, "control extinction: the segment's minimum, or given");
-    visit.number("value", choice.value, Range::non_negative(), "1/length", "control extinction (given); at most the medium's minimum");
+    visit.number("value", choice.value, Range::non_negative(), "1/length",
+                 "control extinction (given); at most the medium's minimum");
   }
 
   void check(const Extrema& medium) const {
@@ -73,7 +74,7 @@ struct ResidualDeltaTracking {
 
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
     const Real transmittance = std::exp(-profile.optical_depth(c));
-    const Real residual = profile.optical_depth(c) - channel(ray.control.depth, c);
+    const Real residual = std::max<Real>(0, profile.optical_depth(c) - channel(ray.control.depth, c));
     return {.variance = transmittance * std::exp(-channel(ray.control.depth, c)) * -std::expm1(-residual),
             .lookups = lookups_until_killed(
                 profile,

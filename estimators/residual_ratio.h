@@ -4,9 +4,10 @@
 
 namespace nullmark {
 
-/// Residual ratio tracking [Novák, Selle, Jarosz 2014, Alg. 2]: T = T_c T_r, the control's transmittance in closed form times a ratio estimate of
-/// the residual's at rate mubr.  Unbiased for any mubr > 0.  Multiplicands lie in [0,2] with mubr >= max |mu - mu_c|, so samples are
-/// non-negative but unbounded.  Var = T^2 (exp(int (mu - mu_c)^2/mubr) - 1), lookups int mubr.  `component` gives T_c or T_r alone.
+/// Residual ratio tracking [Novák, Selle, Jarosz 2014, Alg. 2]: T = T_c T_r, the control's transmittance in closed form times a
+/// ratio estimate of the residual's at rate mubr.  Unbiased for any mubr > 0.  Multiplicands lie in [0,2] with mubr >= max |mu -
+/// mu_c|, so samples are non-negative but unbounded.  Var = T^2 (exp(int (mu - mu_c)^2/mubr) - 1), lookups int mubr.  `component`
+/// gives T_c or T_r alone.
 template <class Value>
 struct ResidualRatioTracking {
   static constexpr const char* kName = "residual_ratio";
@@ -20,7 +21,8 @@ struct ResidualRatioTracking {
 
   void parameters(ParameterVisitor& visit) {
     choice.parameters(visit);
-    visit.choice("component", component, {"product", "control", "residual"}, "what is estimated: T = T_c T_r, T_c, or T_r = T/T_c");
+    visit.choice("component", component, {"product", "control", "residual"},
+                 "what is estimated: T = T_c T_r, T_c, or T_r = T/T_c");
   }
 
   bool needs_optical_depth() const { return choice.kind == "ray_average"; }

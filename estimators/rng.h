@@ -22,9 +22,8 @@ class Rng {
  public:
   Rng() = default;
   explicit Rng(const SampleAddress& at) : sample_(at.sample) {
-    const auto block = philox4x32(
-        {static_cast<std::uint32_t>(at.sample), static_cast<std::uint32_t>(at.sample >> 32), at.ray, 0},
-        {static_cast<std::uint32_t>(at.key), static_cast<std::uint32_t>(at.key >> 32)});
+    const auto block = philox4x32({static_cast<std::uint32_t>(at.sample), static_cast<std::uint32_t>(at.sample >> 32), at.ray, 0},
+                                  {static_cast<std::uint32_t>(at.key), static_cast<std::uint32_t>(at.key >> 32)});
     a_ = block[0] | std::uint64_t{block[1]} << 32;
     b_ = block[2] | std::uint64_t{block[3]} << 32;
     if ((a_ | b_) == 0) b_ = 1;  // the one state xoroshiro cannot leave

@@ -7,10 +7,10 @@
 
 namespace nullmark {
 
-/// P(a killed walk is still alive) at every node of the profile.  All channels of a walk compare the same random number with their own
-/// extinction f(c, node), so a set S of channels lives on with probability exp(-int max_{c in S} f) and inclusion-exclusion gives the
-/// union; one channel that is thinnest everywhere outlives the others and is the answer alone.  Nothing beyond 8 unordered channels,
-/// where the 2^n terms stop being worth it.
+/// P(a killed walk is still alive) at every node of the profile.  All channels of a walk compare the same random number with
+/// their own extinction f(c, node), so a set S of channels lives on with probability exp(-int max_{c in S} f) and
+/// inclusion-exclusion gives the union; one channel that is thinnest everywhere outlives the others and is the answer alone.
+/// Nothing beyond 8 unordered channels, where the 2^n terms stop being worth it.
 template <class F>
 std::optional<std::vector<Real>> survival(const RayProfile& profile, F&& f) {
   const auto channels = static_cast<std::size_t>(profile.channels());

@@ -9,8 +9,8 @@
 
 namespace nullmark {
 
-/// Times an estimator's kernel over a medium and a constant majorant on one ray along x through the middle of the unit cube: 256 samples
-/// a traversal, a new address for each.  Counts lookups as items.
+/// Times an estimator's kernel over a medium and a constant majorant on one ray along x through the middle of the unit cube: 256
+/// samples a traversal, a new address for each.  Counts lookups as items.
 template <template <class> class Estimator>
 void run_kernel_bench(benchmark::State& state, const std::shared_ptr<const Medium>& medium, Real majorant,
                       const Ray& world = {{0, 0.5, 0.5}, {1, 0, 0}, 0, 1}) {

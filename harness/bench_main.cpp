@@ -16,7 +16,8 @@ double median(std::vector<double> values) {
 }
 
 /// Benchmarks are named group/what; the group's first entry is its hand-written baseline.  Prints the median nanoseconds of one
-/// counted item (lookup, draw) and the ratio to the baseline: ratios of one process carry over to other machines, nanoseconds do not.
+/// counted item (lookup, draw) and the ratio to the baseline: ratios of one process carry over to other machines, nanoseconds do
+/// not.
 class RatioReporter final : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context& context) override {
@@ -49,7 +50,8 @@ class RatioReporter final : public benchmark::BenchmarkReporter {
       }
       std::vector<double> deviation;
       for (const double value : values_[name]) deviation.push_back(std::abs(value - ns));
-      fmt::print("  {:<44} {:8.2f} ns  +-{:4.1f} %  {:6.2f}x\n", name.substr(slash + 1), ns, 100 * median(deviation) / ns, ns / base);
+      fmt::print("  {:<44} {:8.2f} ns  +-{:4.1f} %  {:6.2f}x\n", name.substr(slash + 1), ns, 100 * median(deviation) / ns,
+                 ns / base);
     }
   }
 

@@ -15,16 +15,16 @@ struct RayOf {
   using type = Passage<Value>;
 };
 template <class E, class Value>
-  requires requires { typename E::Ray; }
+requires requires { typename E::Ray; }
 struct RayOf<E, Value> {
   using type = typename E::Ray;
 };
 
 }  // namespace detail
 
-/// The loop that runs an estimator.  A block of walks of one ray steps together: all propose, the medium answers all points in one indirect
-/// call, all consume, the finished leave.  So there is one kernel per estimator and one per medium instead of one per pair, and the loop
-/// alone counts, audits the majorant and hands out random streams.
+/// The loop that runs an estimator.  A block of walks of one ray steps together: all propose, the medium answers all points in
+/// one indirect call, all consume, the finished leave.  So there is one kernel per estimator and one per medium instead of one
+/// per pair, and the loop alone counts, audits the majorant and hands out random streams.
 template <template <class> class Estimator, class Value>
 class BlockKernel final : public Kernel {
   using E = Estimator<Value>;
@@ -44,7 +44,7 @@ class BlockKernel final : public Kernel {
     std::array<Rng, kBlock> rng;
     std::array<std::uint32_t, kBlock> active;
     std::array<Real, kBlock> x, y, z;
-    std::array<Real, kBlock * (std::is_same_v<Value, Real> ? 1 : kMaxChannels)> extinction;
+    std::array<Real, kBlock*(std::is_same_v<Value, Real> ? 1 : kMaxChannels)> extinction;
   };
 
  public:
@@ -62,12 +62,15 @@ class BlockKernel final : public Kernel {
   }
 
   bool states_theory() const override {
-    return requires(const E& e, const Ray& ray, const RayProfile& profile) { e.theory(ray, profile, 0, Quantity::transmittance); };
+    return requires(const E& e, const Ray& ray, const RayProfile& profile) {
+      e.theory(ray, profile, 0, Quantity::transmittance);
+    };
   }
 
   bool answers(Quantity quantity) const override {
-    return quantity == Quantity::transmittance ||
-           requires(const E& e, const Walk& walk, const Ray& ray) { e.optical_depth(walk, ray); };
+    return quantity == Quantity::transmittance || requires(const E& e, const Walk& walk, const Ray& ray) {
+      e.optical_depth(walk, ray);
+    };
   }
 
   std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }

@@ -8,7 +8,8 @@
 
 namespace nullmark {
 
-/// xoshiro256+ [Blackman and Vigna 2021], seeded by splitmix64: the generator of the hand-written loops that cells are compared with.
+/// xoshiro256+ [Blackman and Vigna 2021], seeded by splitmix64: the generator of the hand-written loops that cells are compared
+/// with.
 class PlainRng {
  public:
   explicit PlainRng(std::uint64_t seed) {

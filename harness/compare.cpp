@@ -95,12 +95,14 @@ std::string compare_results(const std::vector<RunRecord>& runs, const std::strin
       const Efficiency& e = row.efficiency;
       const std::string error = e.relative_error > 0 ? fmt::format(" +-{:.1f}%", 196 * e.relative_error) : "";
       const bool floored = e.floor && *e.floor > 0 && row.record->claims != "unbiased" && row.record->claims != "exact";
-      out += fmt::format("  {:<{}} {:>10} {:>10} {:>8} {:>10} {:>8} {:>10} {:>8} {:>9}{}\n", row.record->cell.estimator.label, width,
-                         number(e.variance), number(e.variance_x_lookups), ratio(e.variance_x_lookups, reference.variance_x_lookups),
-                         number(e.variance_x_ns), ratio(e.variance_x_ns, reference.variance_x_ns),
-                         e.seconds_to_1pct ? fmt::format("{:.3g}", *e.seconds_to_1pct) : row.record->time ? "never" : "-",
-                         ratio(e.seconds_to_1pct, reference.seconds_to_1pct), floored ? fmt::format("{:.2g} %", 100 * *e.floor) : "",
-                         error);
+      out += fmt::format(
+          "  {:<{}} {:>10} {:>10} {:>8} {:>10} {:>8} {:>10} {:>8} {:>9}{}\n", row.record->cell.estimator.label, width,
+          number(e.variance), number(e.variance_x_lookups), ratio(e.variance_x_lookups, reference.variance_x_lookups),
+          number(e.variance_x_ns), ratio(e.variance_x_ns, reference.variance_x_ns),
+          e.seconds_to_1pct  ? fmt::format("{:.3g}", *e.seconds_to_1pct)
+          : row.record->time ? "never"
+                             : "-",
+          ratio(e.seconds_to_1pct, reference.seconds_to_1pct), floored ? fmt::format("{:.2g} %", 100 * *e.floor) : "", error);
     }
     out += "\n";
   }

@@ -18,8 +18,8 @@ struct Efficiency {
 };
 Efficiency efficiency(const CellRecord& record);
 
-/// A table per quantity, ray set, medium and majorant: estimators by time to 1 % relative RMSE, each beside the baseline (default: the first that
-/// is unbiased).  Throws ParameterError when the baseline names no estimator of the results.
+/// A table per quantity, ray set, medium and majorant: estimators by time to 1 % relative RMSE, each beside the baseline
+/// (default: the first that is unbiased).  Throws ParameterError when the baseline names no estimator of the results.
 std::string compare_results(const std::vector<RunRecord>& runs, const std::string& baseline);
 
 }  // namespace nullmark

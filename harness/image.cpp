@@ -17,9 +17,9 @@ void write_png(const std::string& path, int width, int height, int channels, con
     for (std::size_t x = 0; x < w; ++x)
       for (std::size_t c = 0; c < 3; ++c) {
         const Real value = values[((h - 1 - y) * w + x) * n + (n == 3 ? c : 0)] / maximum;
-        pixels[(y * w + x) * 3 + c] = !std::isfinite(value)
-                                          ? (c == 1 ? 0 : 255)
-                                          : static_cast<std::uint8_t>(std::lround(255 * std::min<Real>(1, std::max<Real>(0, value))));
+        pixels[(y * w + x) * 3 + c] =
+            !std::isfinite(value) ? (c == 1 ? 0 : 255)
+                                  : static_cast<std::uint8_t>(std::lround(255 * std::min<Real>(1, std::max<Real>(0, value))));
       }
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"), &std::fclose);
   if (!file) throw std::runtime_error(path + ": cannot be written");

@@ -15,14 +15,14 @@ struct RayContext {
   Ray world, local;  ///< cut to the medium
   std::uint32_t index = 0;
   SegmentBuffer segments;
-  std::vector<Real> knots;            ///< sorted, with begin and end; filled only when the kernel needs them
+  std::vector<Real> knots;              ///< sorted, with begin and end; filled only when the kernel needs them
   std::optional<Spectrum> exact_depth;  ///< filled only when the kernel needs it
 };
 
 /// Results of a block of samples of one ray.
 struct SampleBlock {
-  std::vector<Real> values;             ///< values[i * channels + c]
-  std::vector<std::uint32_t> lookups;   ///< per sample
+  std::vector<Real> values;            ///< values[i * channels + c]
+  std::vector<std::uint32_t> lookups;  ///< per sample
 };
 
 /// Exact event counts; adding them is associative, so any order of merging gives the same totals.

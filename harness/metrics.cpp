@@ -74,10 +74,4 @@ std::optional<Real> variance_x_ns(const CellRecord& record, std::size_t channel)
   return *variance * record.time->ns_per_sample;
 }
 
-std::optional<Real> seconds_to_1pct(const CellRecord& record, std::size_t channel) {
-  const std::optional<Real>& relative = record.channel[channel].relative_variance;
-  if (!relative || !record.time) return std::nullopt;
-  return *relative / 1e-4 * record.time->ns_per_sample * 1e-9;
-}
-
 }  // namespace nullmark

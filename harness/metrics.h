@@ -24,7 +24,4 @@ std::optional<Real> metric_theory(const CellRecord& record, std::string_view nam
 std::optional<Real> variance_x_lookups(const CellRecord& record, std::size_t channel);
 std::optional<Real> variance_x_ns(const CellRecord& record, std::size_t channel);
 
-/// Time of one thread until the pooled mean's standard error is 1 % of it: relative variance x ns per sample / 1e-4, in seconds.
-std::optional<Real> seconds_to_1pct(const CellRecord& record, std::size_t channel);
-
 }  // namespace nullmark

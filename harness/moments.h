@@ -8,8 +8,8 @@
 
 namespace nullmark {
 
-/// Power sums of the errors x - reference of one ray and channel.  Shifting by the reference keeps the variance accurate however small it is
-/// beside the mean; sums of shards add.
+/// Power sums of the errors x - reference of one ray and channel.  Shifting by the reference keeps the variance accurate however
+/// small it is beside the mean; sums of shards add.
 struct Moments {
   Real s1 = 0, s2 = 0, s3 = 0, s4 = 0;
   std::uint64_t count = 0;
@@ -43,8 +43,8 @@ struct Moments {
   }
 };
 
-/// Squared errors of the means of 1, 2, 4, ... consecutive samples, over all disjoint groups of each size: a binary counter of partial
-/// sums.  Groups of one ray only; `finish_ray` drops the incomplete ones.
+/// Squared errors of the means of 1, 2, 4, ... consecutive samples, over all disjoint groups of each size: a binary counter of
+/// partial sums.  Groups of one ray only; `finish_ray` drops the incomplete ones.
 class GroupErrors {
  public:
   struct Level {

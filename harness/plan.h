@@ -28,10 +28,10 @@ struct Component {
 
 /// A medium: one field, optionally times a spectrum; or one grey field per channel.
 struct MediumSpec {
-  Component field;                ///< type "channels" when `per_channel` is not empty
-  std::vector<Real> spectrum;     ///< empty: grey
+  Component field;             ///< type "channels" when `per_channel` is not empty
+  std::vector<Real> spectrum;  ///< empty: grey
   std::vector<MediumSpec> per_channel;
-  bool optional = false;          ///< a missing data file skips the cells instead of failing the run
+  bool optional = false;  ///< a missing data file skips the cells instead of failing the run
   std::string label;
 
   bool operator==(const MediumSpec& other) const {
@@ -41,16 +41,16 @@ struct MediumSpec {
 
 /// What is done to every single sample (and to the reference) before it enters the statistics.
 struct Measurement {
-  bool clamp = false;          ///< to [0, 1]
-  int quantise_bits = 0;       ///< 0: none; n: round to the nearest multiple of 1/(2^n - 1)
+  bool clamp = false;     ///< to [0, 1]
+  int quantise_bits = 0;  ///< 0: none; n: round to the nearest multiple of 1/(2^n - 1)
 
   bool operator==(const Measurement&) const = default;
 };
 
 /// One point of a sweep.  Indices refer to the plan's lists, in which equal specifications stand once.
 struct Cell {
-  std::string id;          ///< hash of everything that decides the statistics
-  std::string name;        ///< "estimator/medium/majorant", unique in the plan (experiment and seed are prefixed where needed)
+  std::string id;    ///< hash of everything that decides the statistics
+  std::string name;  ///< "estimator/medium/majorant", unique in the plan (experiment and seed are prefixed where needed)
   std::string experiment;
   Component estimator;
   std::size_t medium = 0, majorant = 0, rays = 0;
@@ -61,24 +61,24 @@ struct Cell {
   std::uint64_t seed = 1;
   bool own_streams = false;  ///< streams keyed by the estimator too, instead of common random numbers
   bool images = false;
-  Real image_maximum = 1;    ///< value shown white
+  Real image_maximum = 1;  ///< value shown white
 };
 
 /// How wall time is measured: one thread, repetitions interleaved at random over all cells.
 struct TimingPlan {
   bool enabled = true;
   int repetitions = 5;
-  Real seconds = 0.02;              ///< least time of one repetition
+  Real seconds = 0.02;                       ///< least time of one repetition
   std::uint64_t samples_per_traversal = 64;  ///< samples that share one walk through the majorant structure
 };
 
 /// A row of a published table beside the cells that answer it.
 struct TableRow {
   std::string label;
-  std::vector<std::pair<std::string, Real>> given;               ///< column heading, number from the source
-  std::vector<std::pair<std::string, std::string>> cells;        ///< column heading, cell name
-  std::optional<std::string> theory_of;                          ///< cell name whose theory column is shown
-  std::string note;                                              ///< e.g. "not reproduced"
+  std::vector<std::pair<std::string, Real>> given;         ///< column heading, number from the source
+  std::vector<std::pair<std::string, std::string>> cells;  ///< column heading, cell name
+  std::optional<std::string> theory_of;                    ///< cell name whose theory column is shown
+  std::string note;                                        ///< e.g. "not reproduced"
 };
 struct Table {
   std::string title, metric = "rmse";

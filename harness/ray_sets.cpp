@@ -11,7 +11,8 @@ namespace {
 
 Vec3 normalised(const Vec3& v, const char* parameter) {
   const Real length = v.norm();
-  if (!(length > 0) || !std::isfinite(length)) throw ParameterError(parameter, "direction has no length; expected a finite vector other than 0");
+  if (!(length > 0) || !std::isfinite(length))
+    throw ParameterError(parameter, "direction has no length; expected a finite vector other than 0");
   return v / length;
 }
 
@@ -32,9 +33,7 @@ struct SingleRay final : RaySetSource {
     visit.point("from", from, "length", "start of the ray");
     visit.point("to", to, "length", "end of the ray");
   }
-  RaySet rays(const Box&) const override {
-    return {{Ray{from, normalised(to - from, "to"), 0, (to - from).norm()}}, 0, 0};
-  }
+  RaySet rays(const Box&) const override { return {{Ray{from, normalised(to - from, "to"), 0, (to - from).norm()}}, 0, 0}; }
 };
 
 struct Orthographic final : RaySetSource {
@@ -96,7 +95,8 @@ struct Perspective final : RaySetSource {
   }
 };
 
-/// Isotropic uniform lines: a direction uniform on the sphere and a point uniform on the disc across it that covers the bounds' sphere.
+/// Isotropic uniform lines: a direction uniform on the sphere and a point uniform on the disc across it that covers the bounds'
+/// sphere.
 struct Chords final : RaySetSource {
   static constexpr const char* kName = "chords";
   static constexpr const char* kSummary = "isotropic random lines that hit the bounds";

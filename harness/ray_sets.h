@@ -10,7 +10,8 @@
 
 namespace nullmark {
 
-/// Rays in the world frame, unit directions, not yet cut to a medium.  Pixel grids run row by row from the lowest row of the image.
+/// Rays in the world frame, unit directions, not yet cut to a medium.  Pixel grids run row by row from the lowest row of the
+/// image.
 struct RaySet {
   std::vector<Ray> rays;
   int width = 0, height = 0;  ///< 0 x 0 where the rays form no image

@@ -21,8 +21,8 @@ struct ChannelRecord {
   std::optional<Real> rmse_theory;                       ///< sqrt(mean over rays of variance_theory / n + predicted bias^2)
   std::optional<Real> variance;                          ///< per sample, averaged over the rays
   std::optional<Real> variance_theory;
-  std::optional<Real> relative_variance;                 ///< variance (theory where known) over the mean square of the reference
-  std::optional<Real> kurtosis;                          ///< of the errors around the reference, pooled
+  std::optional<Real> relative_variance;  ///< variance (theory where known) over the mean square of the reference
+  std::optional<Real> kurtosis;           ///< of the errors around the reference, pooled
 };
 
 /// Error of the mean of n samples, measured over all disjoint groups of n.

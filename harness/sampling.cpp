@@ -94,8 +94,8 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
       for (std::size_t c = 0; c < channels && chunk.first == 0; ++c)
         result.reference[ray * channels + c] = measured(expected[static_cast<Eigen::Index>(c)], cell.measurement);
       const std::uint64_t lookups_before = out.counters.lookups;
-      kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, chunk.first, chunk.count, cell.quantity, mine.block,
-                    out.counters);
+      kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, chunk.first, chunk.count, cell.quantity,
+                    mine.block, out.counters);
       const std::size_t local = ray - chunk.first_ray;
       out.lookups[local] = out.counters.lookups - lookups_before;
       for (std::size_t c = 0; c < channels; ++c) {
@@ -210,7 +210,8 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<con
       for (std::size_t ray = 0; ray < rays; ++ray) {
         const auto& [theory, expected] = all[(ray * count + k) * channels + c];
         const Real gap = theory.mean ? *theory.mean - expected : 0;
-        variance = variance && theory.variance && std::isfinite(*theory.variance) ? std::optional(*variance + *theory.variance) : std::nullopt;
+        variance = variance && theory.variance && std::isfinite(*theory.variance) ? std::optional(*variance + *theory.variance)
+                                                                                  : std::nullopt;
         bias = *bias + gap;
         squared = *squared + gap * gap;
         lookups = lookups && theory.lookups ? std::optional(*lookups + *theory.lookups) : std::nullopt;

@@ -22,8 +22,8 @@ struct Sampled {
 /// clamp, then quantise, as configured.
 Real measured(Real value, const Measurement& measurement);
 
-/// Draws every sample of the cell with TBB's threads.  Chunks are cut by the plan alone and merged in their order.  `stop` is asked
-/// between chunks; the result is empty where it answered true.
+/// Draws every sample of the cell with TBB's threads.  Chunks are cut by the plan alone and merged in their order.  `stop` is
+/// asked between chunks; the result is empty where it answered true.
 std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const Kernel& kernel, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress);
 
@@ -32,7 +32,7 @@ struct CellTheory {
   std::vector<std::optional<Real>> variance;      ///< per channel, averaged over rays
   std::vector<std::optional<Real>> squared_bias;  ///< per channel, mean over rays of (mean - reference)^2
   std::vector<std::optional<Real>> bias;
-  std::optional<Real> lookups;                    ///< averaged over rays
+  std::optional<Real> lookups;  ///< averaged over rays
 };
 
 /// Theory of several kernels over one scene: each ray's profile is made once for all of them.

@@ -38,7 +38,8 @@ BuiltMedium build_medium(const MediumSpec& spec) {
   const Affine to_world = built.medium->world_to_local().inverse();
   built.world_bounds = {Vec3::Constant(kInfinity), Vec3::Constant(-kInfinity)};
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 p(corner & 1 ? box.hi.x() : box.lo.x(), corner & 2 ? box.hi.y() : box.lo.y(), corner & 4 ? box.hi.z() : box.lo.z());
+    const Vec3 p(corner & 1 ? box.hi.x() : box.lo.x(), corner & 2 ? box.hi.y() : box.lo.y(),
+                 corner & 4 ? box.hi.z() : box.lo.z());
     built.world_bounds.lo = built.world_bounds.lo.cwiseMin(to_world * p);
     built.world_bounds.hi = built.world_bounds.hi.cwiseMax(to_world * p);
   }
@@ -93,7 +94,8 @@ DepthWithError optical_depth(const Medium& medium, const Ray& local) {
         const Real width = knots[i + 1] - knots[i];
         lookup(knots[i] + width * rule.point[point]);
         for (int c = 0; c < channels; ++c)
-          sum[c] += static_cast<long double>(width * rule.weight[point]) * static_cast<long double>(mu[static_cast<std::size_t>(c)]);
+          sum[c] +=
+              static_cast<long double>(width * rule.weight[point]) * static_cast<long double>(mu[static_cast<std::size_t>(c)]);
       }
     const Spectrum depth = sum.cast<Real>();
     return {depth, Spectrum(8 * kEpsilon * (1 + std::sqrt(pieces)) * depth), "exact_traversal"};

@@ -31,23 +31,6 @@ Json deciding_json(const Plan& plan, const Cell& cell) {
   return json;
 }
 
-Json tables_json(const std::vector<Table>& tables) {
-  Json list = Json::array();
-  for (const Table& table : tables) {
-    Json rows = Json::array();
-    for (const TableRow& row : table.rows) {
-      Json entry = {{"label", row.label}, {"given", Json::object()}, {"cells", Json::object()}};
-      for (const auto& [heading, number] : row.given) entry["given"][heading] = number;
-      for (const auto& [heading, cell] : row.cells) entry["cells"][heading] = {{"cell", cell}};
-      if (row.theory_of) entry["theory"] = {{"cell", *row.theory_of}};
-      if (!row.note.empty()) entry["note"] = row.note;
-      rows.push_back(std::move(entry));
-    }
-    list.push_back({{"title", table.title}, {"metric", table.metric}, {"rows", std::move(rows)}});
-  }
-  return list;
-}
-
 }  // namespace
 
 Json parameters_json(const ParameterValues& values) {
@@ -72,6 +55,23 @@ Json medium_json(const MediumSpec& medium) {
 
 Json measurement_json(const Measurement& measurement) {
   return {{"clamp", measurement.clamp}, {"quantise_bits", measurement.quantise_bits}};
+}
+
+Json tables_json(const std::vector<Table>& tables) {
+  Json list = Json::array();
+  for (const Table& table : tables) {
+    Json rows = Json::array();
+    for (const TableRow& row : table.rows) {
+      Json entry = {{"label", row.label}, {"given", Json::object()}, {"cells", Json::object()}};
+      for (const auto& [heading, number] : row.given) entry["given"][heading] = number;
+      for (const auto& [heading, cell] : row.cells) entry["cells"][heading] = {{"cell", cell}};
+      if (row.theory_of) entry["theory"] = {{"cell", *row.theory_of}};
+      if (!row.note.empty()) entry["note"] = row.note;
+      rows.push_back(std::move(entry));
+    }
+    list.push_back({{"title", table.title}, {"metric", table.metric}, {"rows", std::move(rows)}});
+  }
+  return list;
 }
 
 std::string cell_id(const Plan& plan, const Cell& cell) { return hexadecimal(fnv1a(deciding_json(plan, cell).dump())); }

@@ -15,6 +15,8 @@ Json parameters_json(const ParameterValues& values);
 Json component_json(const Component& component);
 Json medium_json(const MediumSpec& medium);
 Json measurement_json(const Measurement& measurement);
+/// Cells are referred to by name: {"cell": "ratio/linear/global"}.
+Json tables_json(const std::vector<Table>& tables);
 
 /// What decides a cell's statistics, as canonical text, hashed to 16 hexadecimal digits.
 std::string cell_id(const Plan& plan, const Cell& cell);

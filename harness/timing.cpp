@@ -44,7 +44,8 @@ class Collector final : public benchmark::BenchmarkReporter {
       if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
       const auto iterations = static_cast<Real>(run.iterations);
       all[run.run_name.function_name].push_back({run.real_accumulated_time / iterations * 1e9,
-                                                 run.counters.at("samples") / iterations, run.counters.at("lookups") / iterations});
+                                                 run.counters.at("samples") / iterations,
+                                                 run.counters.at("lookups") / iterations});
       progress_(static_cast<double>(++seen_) / static_cast<double>(expected_));
     }
   }
@@ -87,7 +88,8 @@ void run_cell(benchmark::State& state, const TimedCell& timed, const std::vector
 }  // namespace
 
 std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& plan,
-                                                  const std::function<bool()>& stop, const std::function<void(double)>& progress) {
+                                                  const std::function<bool()>& stop,
+                                                  const std::function<void(double)>& progress) {
   static const bool initialised = [] {
     char name[] = "nullmark", interleave[] = "--benchmark_enable_random_interleaving=true";
     char* arguments[] = {name, interleave, nullptr};
@@ -122,7 +124,8 @@ std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& 
       benchmark::DoNotOptimize(majorant);
       benchmark::DoNotOptimize(extinction);
       for (int i = 0; i < 128; ++i) {
-        benchmark::DoNotOptimize(plain_ratio_loop(rng, majorant, [&](Real) { return extinction; }, lookups));
+        benchmark::DoNotOptimize(plain_ratio_loop(
+            rng, majorant, [&](Real) { return extinction; }, lookups));
         ++samples;
       }
     }

@@ -15,9 +15,9 @@ struct TimedCell {
   const Kernel* kernel = nullptr;
 };
 
-/// Wall time of every cell's kernel, traversal included, on one thread, with Google Benchmark: repetitions of all cells and of two
-/// calibration loops are interleaved at random, medians and median absolute deviations are taken over them.  `done` is told of each
-/// repetition.  Stops between repetitions once `stop` answers true; unfinished cells keep no time.
+/// Wall time of every cell's kernel, traversal included, on one thread, with Google Benchmark: repetitions of all cells and of
+/// two calibration loops are interleaved at random, medians and median absolute deviations are taken over them.  `done` is told
+/// of each repetition.  Stops between repetitions once `stop` answers true; unfinished cells keep no time.
 std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& plan,
                                                   const std::function<bool()>& stop, const std::function<void(double)>& progress);
 

@@ -193,9 +193,9 @@ void expect_all(const std::string& file, const std::string& name, const Grid& gr
   const VolumeData data = read_vdb(file, name);
   EXPECT_EQ(static_cast<openvdb::Index64>(data.active_voxels), grid.activeVoxelCount());
   const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+  EXPECT_EQ(data.active.lo, Index3(box.min().x(), box.min().y(), box.min().z()));
+  EXPECT_EQ(data.active.hi, Index3(box.max().x(), box.max().y(), box.max().z()));
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_EQ(data.active.lo[axis], box.min()[axis]);
-    EXPECT_EQ(data.active.hi[axis], box.max()[axis]);
     // Edge lengths of the voxel, also where it is rotated.
     openvdb::Vec3d step(0.);
     step[axis] = 1;

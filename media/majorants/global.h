@@ -4,8 +4,8 @@
 
 namespace nullmark {
 
-/// One segment per ray, bounded over the whole medium.  `looseness` k makes the majorant k times the bound; below 1 it no longer bounds
-/// (violations are counted).
+/// One segment per ray, bounded over the whole medium.  `looseness` k makes the majorant k times the bound; below 1 it no longer
+/// bounds (violations are counted).
 class GlobalMajorant final : public MajorantStructure {
  public:
   GlobalMajorant(const Medium& medium, Real looseness)

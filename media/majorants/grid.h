@@ -6,8 +6,9 @@
 
 namespace nullmark {
 
-/// A regular grid of bounds over the medium's local box, walked by 3D-DDA [Amanatides and Woo 1987; Szirmay-Kalos, Toth, Magdics 2011].  Each cell
-/// holds the extrema of the extinction inside it, for trilinear volumes over the whole filter footprint (the medium's `extrema` sees to that).
+/// A regular grid of bounds over the medium's local box, walked by 3D-DDA [Amanatides and Woo 1987; Szirmay-Kalos, Toth, Magdics
+/// 2011].  Each cell holds the extrema of the extinction inside it, for trilinear volumes over the whole filter footprint (the
+/// medium's `extrema` sees to that).
 class GridMajorant final : public MajorantStructure {
  public:
   GridMajorant(const Medium& medium, const std::array<int, 3>& resolution, Real looseness);

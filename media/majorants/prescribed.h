@@ -4,8 +4,8 @@
 
 namespace nullmark {
 
-/// A sampling rate given by the user, mub(p) = value + gradient . p at world points, constant along each ray: the larger of its two ends.  It
-/// need not bound the extinction; where it does not, violations are counted.
+/// A sampling rate given by the user, mub(p) = value + gradient . p at world points, constant along each ray: the larger of its
+/// two ends.  It need not bound the extinction; where it does not, violations are counted.
 class PrescribedMajorant final : public MajorantStructure {
  public:
   PrescribedMajorant(const Medium& medium, Real value, const Vec3& gradient)

@@ -1,0 +1,209 @@
+#include "harness/cli.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+
+#include "harness/commands.h"
+#include "harness/compare.h"
+#include "harness/export.h"
+#include "harness/file_io.h"
+#include "harness/json_input.h"
+#include "harness/merge.h"
+#include "harness/provenance.h"
+#include "harness/results_json.h"
+#include "harness/schema.h"
+#include "media/registry.h"
+#include "media/vdb_writer.h"
+
+namespace nullmark {
+namespace {
+
+/// Text to a file, or to standard output for "" and "-".
+void deliver(const std::string& text, const std::string& output) {
+  if (output.empty() || output == "-")
+    fmt::print("{}", text);
+  else
+    write_atomically(output, text);
+}
+
+std::vector<RunRecord> load_all(const std::vector<std::string>& files) {
+  std::vector<RunRecord> runs;
+  for (const std::string& file : files) runs.push_back(read_results(read_file(file), file));
+  return runs;
+}
+
+/// The commands of the program, what they take, and what the user asked of them.
+class CommandLine {
+ public:
+  CommandLine(int argc, char** argv) {
+    run_.command_line.assign(argv, argv + argc);
+    app_.set_version_flag("--version", version_line());
+    app_.require_subcommand(1);
+    app_.failure_message(CLI::FailureMessage::simple);
+    add_run();
+    add_compare();
+    add_list();
+    add_schema();
+    add_export();
+    add_merge();
+    add_make_volume();
+  }
+
+  ExitCode execute() {
+    const std::vector<std::string>& words = run_.command_line;
+    if (words.size() > 1) refuse_unknown_command(words[1]);
+    std::vector<std::string> reversed(words.rbegin(), words.rend() - 1);
+    try {
+      app_.parse(reversed);
+    } catch (const CLI::ParseError& error) {
+      // Help and version end the parse by throwing as well.
+      if (error.get_exit_code() == 0) return static_cast<ExitCode>(app_.exit(error));
+      throw InputError(one_line(error.what()));
+    }
+    return action_();
+  }
+
+ private:
+  static std::string one_line(std::string text) {
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    return text;
+  }
+
+  void refuse_unknown_command(const std::string& word) const {
+    std::vector<std::string> names;
+    for (const CLI::App* command : app_.get_subcommands({})) names.push_back(command->get_name());
+    if (word.rfind('-', 0) == 0 || std::find(names.begin(), names.end(), word) != names.end()) return;
+    const std::string near = nearest(word, names);
+    throw InputError(fmt::format("unknown command \"{}\"; {}", word,
+                                 near.empty() ? "--help lists them" : fmt::format("did you mean \"{}\"?", near)));
+  }
+
+  template <class Action>
+  CLI::App* add(const char* name, const char* text, Action action) {
+    CLI::App* command = app_.add_subcommand(name, text);
+    command->final_callback([this, action] { action_ = action; });
+    return command;
+  }
+
+  void add_run() {
+    CLI::App* command = add("run", "Run configurations and write their results", [this] { return run_command(run_); });
+    command->add_option("CONFIG", run_.configs, "Configuration files, folders of them, or - for standard input")->required();
+    command->add_option("-o,--output", run_.output, "Results file (default: CONFIG's stem + .results.json); - for standard output");
+    command->add_option("--threads", run_.threads, "Threads; 0: all cores.  Results do not depend on it")
+        ->check(CLI::Range(0, 4096));
+    command->add_option("--seed", run_.seed, "Seed in place of the configuration's, or \"random\"");
+    command->add_option("--filter", run_.filter, "Only cells whose name matches this regular expression");
+    command->add_option("--shard", run_.shard, "Only part K of N: K/N");
+    command->add_flag("--resume", run_.resume, "Go on from the results and the journal that are there");
+    command->add_flag("--force", run_.force, "Replace results that are there")->excludes("--resume");
+    command->add_flag("--dry-run", run_.dry_run, "Print cells, predicted samples, lookups and time; sample nothing");
+    command->add_option("--time-budget", run_.time_budget, "Seconds after which no further cell is started")
+        ->check(CLI::NonNegativeNumber);
+    command->add_flag("--no-timing", run_.no_timing, "Statistics only");
+  }
+
+  void add_compare() {
+    CLI::App* command = add("compare", "Rank estimators by what accuracy costs in time", [this] {
+      fmt::print("{}", compare_results(load_all(files_), baseline_));
+      return ExitCode::ok;
+    });
+    command->add_option("RESULTS", files_, "Results files")->required();
+    command->add_option("--baseline", baseline_, "Estimator to compare the others with");
+  }
+
+  void add_list() {
+    CLI::App* command =
+        add("list", "List what configurations may name, with parameters and sources", [this] { return list_command(list_); });
+    command->add_option("WHAT", list_.what, "estimators, media, majorants, rays or quantities")
+        ->required()
+        ->check(CLI::IsMember({"estimators", "media", "majorants", "rays", "quantities"}));
+    command->add_flag("--json", list_.json, "As JSON");
+  }
+
+  void add_schema() {
+    CLI::App* command = add("schema", "Print a JSON Schema (draft-07)", [this] {
+      fmt::print("{}\n", (schema_ == "config" ? config_schema() : results_schema()).dump(2));
+      return ExitCode::ok;
+    });
+    command->add_option("WHICH", schema_, "config or results")->required()->check(CLI::IsMember({"config", "results"}));
+  }
+
+  void add_export() {
+    CLI::App* command = add("export", "Write results in another program's format", [this] {
+      const RunRecord run = load_all({file_})[0];
+      deliver(export_results(run, format_, file_), output_);
+      return ExitCode::ok;
+    });
+    command->add_option("RESULTS", file_, "Results file")->required();
+    command->add_option("--format", format_, "google-benchmark, csv, jsonl or junit")
+        ->required()
+        ->check(CLI::IsMember(export_formats()));
+    command->add_option("-o,--output", output_, "File; default standard output");
+  }
+
+  void add_merge() {
+    CLI::App* command = add("merge", "Join the results of shards", [this] {
+      if (!force_ && output_ != "-" && std::filesystem::exists(output_)) throw InputError(output_ + ": exists; --force replaces it");
+      deliver(results_text(merge_results(load_all(files_), files_)), output_);
+      return ExitCode::ok;
+    });
+    command->add_option("PART", files_, "Results files of one configuration")->required();
+    command->add_option("-o,--output", output_, "Results file; - for standard output")->required();
+    command->add_flag("--force", force_, "Replace results that are there");
+  }
+
+  void add_make_volume() {
+    CLI::App* command = add("make-volume", "Write a procedural smoke volume (OpenVDB, grid \"density\")", [this] {
+      write_procedural_vdb(file_, volume_);
+      return ExitCode::ok;
+    });
+    command->add_option("FILE", file_, "Path to write")->required();
+    command->add_option("--seed", volume_.seed, "Of the noise");
+    command->add_option("--resolution", volume_.resolution, "Voxels across");
+    command->add_flag("--half", volume_.half, "Store 16-bit values");
+  }
+
+  CLI::App app_{"Benchmark and validation harness for null-collision trackers", "nullmark"};
+  std::function<ExitCode()> action_;
+  RunCommand run_;
+  ListCommand list_;
+  ProceduralVdb volume_;
+  std::vector<std::string> files_;
+  std::string file_, baseline_, schema_, format_, output_;
+  bool force_ = false;
+};
+
+ExitCode report(ExitCode code, const std::string& message) {
+  fmt::print(stderr, "nullmark: {}\n", message);
+  return code;
+}
+
+ExitCode guarded(int argc, char** argv) {
+  try {
+    return CommandLine(argc, argv).execute();
+  } catch (const InputError& error) {
+    return report(ExitCode::input_error, error.what());
+  } catch (const MissingData& error) {
+    return report(ExitCode::input_error, error.what());
+  } catch (const ParameterError& error) {
+    return report(ExitCode::input_error, (error.parameter.empty() ? "" : error.parameter + ": ") + error.what());
+  } catch (const std::exception& error) {
+    return report(ExitCode::internal_error, fmt::format("internal error: {}", error.what()));
+  }
+}
+
+}  // namespace
+
+int nullmark_main(int argc, char** argv) {
+  ExitCode code = guarded(argc, argv);
+  // A full disk or a closed pipe shows only here.
+  if (std::fflush(stdout) != 0 && code == ExitCode::ok) code = report(ExitCode::internal_error, "standard output cannot be written");
+  return static_cast<int>(code);
+}
+
+}  // namespace nullmark

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/exit_code.h"
+
+namespace nullmark {
+
+/// `nullmark run`.
+struct RunCommand {
+  std::vector<std::string> configs;
+  std::string output;  ///< empty: by the configuration's name; "-": standard output
+  std::string seed;    ///< empty: the configuration's; "random"; or a number
+  std::string filter;  ///< regular expression on cell names
+  std::string shard;   ///< "K/N", 1 <= K <= N
+  int threads = 0;
+  std::optional<double> time_budget;
+  bool resume = false, force = false, dry_run = false, no_timing = false;
+  std::vector<std::string> command_line;
+};
+ExitCode run_command(const RunCommand& command);
+
+/// `nullmark list`.
+struct ListCommand {
+  std::string what;  ///< "estimators", "media", "majorants", "rays" or "quantities"
+  bool json = false;
+};
+ExitCode list_command(const ListCommand& command);
+
+}  // namespace nullmark

@@ -1,0 +1,147 @@
+// The shipped configurations give what the README says they give.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+
+#include "harness/config.h"
+#include "harness/run.h"
+#include "harness/scene.h"
+
+namespace nullmark {
+namespace {
+
+Plan shipped(const std::string& name) {
+  return read_configs(load_configs({std::string(NULLMARK_SOURCE_DIR) + "/configs/" + name}));
+}
+
+std::vector<CellRecord> run(const Plan& plan) {
+  RunOptions options;
+  options.timing = false;
+  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, {});
+}
+
+const CellRecord& find(const std::vector<CellRecord>& records, const std::string& experiment, const std::string& estimator) {
+  for (const CellRecord& record : records)
+    if (record.cell.experiment == experiment && record.cell.estimator.label == estimator) return record;
+  throw std::runtime_error("no cell " + experiment + " " + estimator);
+}
+
+TEST(Configs, AllOfThemExpand) {
+  for (const auto& entry : std::filesystem::directory_iterator(std::string(NULLMARK_SOURCE_DIR) + "/configs"))
+    if (entry.path().extension() == ".json") {
+      const Plan plan = shipped(entry.path().filename().string());
+      EXPECT_FALSE(plan.cells.empty()) << entry.path();
+    }
+}
+
+/// Kozelj's Table 1: corrected within 2 % of theory at 256 x 256, as published within 4 % of the printed values at 400 x 400.
+TEST(Configs, Seed004TableIsReproducedAndCorrected) {
+  const auto records = run(shipped("seed_004_table1.json"));
+  struct Row {
+    const char *published_estimator, *estimator;
+    Real published, theory;
+  };
+  for (const Row& row : {Row{"delta", "delta", .02404, .02357}, Row{"ratio_published_hash", "ratio", .00981, .00286},
+                         Row{"next_flight_delta", "next_flight_delta", .15833, .03615},
+                         Row{"next_flight_ratio_published_step", "next_flight_ratio", .10546, .02342}}) {
+    const CellRecord& corrected = find(records, "corrected", row.estimator);
+    EXPECT_NEAR(*corrected.channel[0].rmse / row.theory, 1, 0.02) << row.estimator;
+    EXPECT_NEAR(*corrected.channel[0].rmse_theory / row.theory, 1, 0.002) << row.estimator;
+    EXPECT_NEAR(*find(records, "as_published", row.published_estimator).channel[0].rmse / row.published, 1, 0.04) << row.estimator;
+  }
+  EXPECT_NEAR(*find(records, "corrected", "delta").lookups_per_sample, 36.390, 0.01 * 36.390);
+  EXPECT_NEAR(*find(records, "corrected", "delta").null_collisions_per_sample, 35.890, 0.01 * 35.890);
+  EXPECT_NEAR(*find(records, "corrected", "ratio").lookups_per_sample, 52.5, 0.01 * 52.5);
+  for (const CellRecord& record : records) {
+    if (record.cell.experiment == "corrected_marching") {
+      EXPECT_LT(*record.channel[0].rmse, 1e-12) << record.cell.name;
+    }
+  }
+}
+
+/// E[T_r] = T / T_c: residual and product means agree with their references to 5.5 standard errors.
+TEST(Configs, Seed000ResidualsHaveTheirExpectation) {
+  Plan plan = shipped("seed_000_controls.json");
+  std::vector<bool> selected;
+  for (const Cell& cell : plan.cells) selected.push_back(cell.experiment == "expectation");
+  RunOptions options;
+  options.timing = false;
+  const auto records = run_plan(plan, selected, {}, options, {});
+  EXPECT_EQ(records.size(), 6u);
+  for (const CellRecord& record : records) {
+    const ChannelRecord& channel = record.channel[0];
+    EXPECT_LT(std::abs(*channel.bias), 5.5 * std::sqrt(*channel.variance_theory / static_cast<Real>(record.samples)))
+        << record.cell.name;
+  }
+}
+
+class RealVolumes : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::getenv("NULLMARK_DATA")) GTEST_SKIP() << "NULLMARK_DATA is not set";
+  }
+};
+
+/// tau by the exact traversal against a midpoint march of 1e6 steps, to the march's own error.
+TEST_F(RealVolumes, ReferencesAgreeWithAMillionStepMarch) {
+  const Plan plan = shipped("volumes.json");
+  constexpr int kSteps = 1'000'000;
+  for (const MediumSpec& spec : plan.media) {
+    const BuiltMedium built = build_medium(spec);
+    const BuiltRays rays = build_rays(plan.ray_sets[0], built);
+    std::size_t longest = 0;
+    for (std::size_t r = 0; r < rays.local.size(); ++r)
+      if (rays.local[r].length() > rays.local[longest].length()) longest = r;
+    const Ray ray = rays.local[longest];
+    const DepthWithError exact = optical_depth(*built.medium, ray);
+    EXPECT_STREQ(exact.method, "exact_traversal");
+    std::vector<Real> x(kSteps), y(kSteps), z(kSteps), mu(kSteps);
+    const Real h = ray.length() / kSteps;
+    for (int i = 0; i < kSteps; ++i) {
+      const Vec3 p = ray.at(ray.begin + (i + 0.5) * h);
+      const auto k = static_cast<std::size_t>(i);
+      x[k] = p.x();
+      y[k] = p.y();
+      z[k] = p.z();
+    }
+    built.medium->extinction({x.data(), y.data(), z.data(), mu.size()}, mu.data());
+    Real march = 0;
+    for (const Real value : mu) march += value * h;
+    std::vector<Real> knots;
+    sorted_knots(*built.medium, ray, knots);
+    // A jump costs a midpoint march up to half a step of its height; a kink far less.
+    const Real error = static_cast<Real>(knots.size()) * built.extrema.maximum[0] * h / 2;
+    EXPECT_GT(exact.depth[0], 0) << spec.label;
+    EXPECT_NEAR(exact.depth[0], march, error) << spec.label;
+    EXPECT_LT(error, 0.02 * exact.depth[0] + 1e-3) << spec.label;
+  }
+}
+
+TEST_F(RealVolumes, AGridMajorantSavesLookupsOnSmokeAndLeavesTheTransmittance) {
+  Plan plan = shipped("volumes.json");
+  std::vector<bool> selected;
+  for (const Cell& cell : plan.cells)
+    selected.push_back(plan.media[cell.medium].label.find("/smoke.vdb") != std::string::npos && cell.estimator.label == "ratio");
+  RunOptions options;
+  options.timing = false;
+  const auto records = run_plan(plan, selected, {}, options, {});
+  std::map<std::string, std::map<std::string, const CellRecord*>> by_medium;
+  for (const CellRecord& record : records) by_medium[record.medium.label][record.majorant.type] = &record;
+  EXPECT_EQ(by_medium.size(), 2u);
+  for (const auto& [label, pair] : by_medium) {
+    const CellRecord &global = *pair.at("global"), &grid = *pair.at("grid");
+    EXPECT_GT(*global.lookups_per_sample, 5 * *grid.lookups_per_sample) << label;
+    EXPECT_EQ(*global.channel[0].reference, *grid.channel[0].reference);
+    for (const CellRecord* record : {&global, &grid}) {
+      const Real error = std::sqrt(*record->channel[0].variance_theory / static_cast<Real>(record->samples));
+      EXPECT_LT(std::abs(*record->channel[0].bias), 5.5 * error) << record->cell.name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace nullmark

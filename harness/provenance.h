@@ -1,0 +1,26 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace nullmark {
+
+/// What a run was made with and on: source, compiler, machine, libraries, command; values are JSON texts.  No host name.
+struct RunContext {
+  std::vector<std::string> command_line;
+  int threads = 0;  ///< cores used
+  std::vector<std::uint64_t> seeds;
+  std::chrono::system_clock::time_point start = std::chrono::system_clock::now();
+};
+std::map<std::string, std::string> make_provenance(const RunContext& context, std::chrono::system_clock::time_point end);
+
+/// "nullmark 0.1.0 (commit 0123abcd, dirty; Release)"
+std::string version_line();
+
+/// ISO 8601 in UTC, to the second.
+std::string iso_time(std::chrono::system_clock::time_point time);
+
+}  // namespace nullmark

@@ -1,0 +1,391 @@
+#include "harness/results_json.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "harness/compare.h"
+#include "harness/metrics.h"
+#include "harness/names.h"
+#include "harness/parameter_values.h"
+#include "harness/spec_json.h"
+
+namespace nullmark {
+namespace {
+
+constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
+constexpr Real kNotANumber = std::numeric_limits<Real>::quiet_NaN();
+
+const std::vector<std::string> kStatus = {"ok", "skipped", "not_run", "error"};
+
+Json real(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+Json real(const std::optional<Real>& x) { return x ? real(*x) : Json(nullptr); }
+
+Json reals(const std::vector<std::optional<Real>>& values, int channels) {
+  if (channels == 1) return values.empty() ? Json(nullptr) : real(values[0]);
+  Json list = Json::array();
+  for (const std::optional<Real>& value : values) list.push_back(real(value));
+  return list.empty() ? Json(nullptr) : list;
+}
+
+/// A number, or a list of one per channel; null where the cell was not sampled.
+template <class Get>
+Json per_channel(const CellRecord& record, const Get& get) {
+  std::vector<std::optional<Real>> values;
+  for (std::size_t c = 0; c < record.channel.size(); ++c) values.push_back(get(c));
+  return reals(values, record.channels);
+}
+
+Json field(const CellRecord& record, std::optional<Real> ChannelRecord::*member) {
+  return per_channel(record, [&](std::size_t c) { return record.channel[c].*member; });
+}
+
+Json typed(const Component& component) {
+  return {{"type", component.type}, {"params", parameters_json(component.values)}, {"label", component.label}};
+}
+
+Json typed(const MediumSpec& medium) {
+  Json json = {{"type", medium.field.type}, {"params", parameters_json(medium.field.values)}, {"label", medium.label}};
+  if (!medium.spectrum.empty()) json["spectrum"] = medium.spectrum;
+  for (const MediumSpec& channel : medium.per_channel) json["media"].push_back(typed(channel));
+  if (medium.optional) json["optional"] = true;
+  return json;
+}
+
+Json time_json(const CellRecord& record) {
+  if (!record.time) return nullptr;
+  const TimeRecord& time = *record.time;
+  Json repetitions = Json::array();
+  for (const Real ns : time.repetition_ns) repetitions.push_back(real(ns));
+  return {{"ns_per_sample", real(time.ns_per_sample)},
+          {"ns_per_lookup", real(time.ns_per_lookup)},
+          {"floor_ratio", real(time.floor_ratio)},
+          {"loop_ratio", real(time.loop_ratio)},
+          {"repetitions", time.repetitions},
+          {"mad", real(time.mad)},
+          {"threads", time.threads},
+          {"traversal_included", true},
+          {"samples_per_traversal", time.samples_per_traversal},
+          {"repetition_ns", std::move(repetitions)},
+          {"variance_x_ns", per_channel(record, [&](std::size_t c) { return variance_x_ns(record, c); })},
+          {"seconds_to_1pct", real(efficiency(record).seconds_to_1pct)}};
+}
+
+Json convergence_json(const CellRecord& record) {
+  Json list = Json::array();
+  for (const ConvergenceRecord& step : record.convergence)
+    list.push_back({{"samples", step.samples},
+                    {"rmse", reals(step.rmse, record.channels)},
+                    {"variance", reals(step.variance, record.channels)}});
+  return list;
+}
+
+std::optional<Real> optional_real(const Place& place) {
+  if (place.json().is_null()) return std::nullopt;
+  return place.number();
+}
+
+std::optional<Real> optional_real(const Place& object, const char* key) {
+  return object.has(key) ? optional_real(object[key]) : std::nullopt;
+}
+
+Real real_or_nan(const Place& object, const char* key) { return optional_real(object, key).value_or(kNotANumber); }
+
+std::uint64_t count(const Place& object, const char* key) {
+  return object.has(key) ? object[key].unsigned_integer(0, kAny) : 0;
+}
+
+std::string string_or_empty(const Place& object, const char* key) {
+  return object.has(key) && !object[key].json().is_null() ? object[key].string() : "";
+}
+
+/// The inverse of `reals` for a sampled cell.
+std::vector<std::optional<Real>> read_reals(const Place& object, const char* key, int channels) {
+  const auto size = static_cast<std::size_t>(channels);
+  if (!object.has(key) || object[key].json().is_null()) return std::vector<std::optional<Real>>(size);
+  const Place place = object[key];
+  if (channels == 1) return {optional_real(place)};
+  if (!place.json().is_array() || place.json().size() != size) place.expected(fmt::format("a list of {} numbers", channels));
+  std::vector<std::optional<Real>> values;
+  for (const Place& element : place.elements()) values.push_back(optional_real(element));
+  return values;
+}
+
+/// A point and a list of three numbers look alike in JSON; only the registry can tell.
+bool is_point(ComponentKind kind, const std::string& type, const std::string& parameter) {
+  try {
+    for (const ParameterInfo& info : parameters_of(kind, type))
+      if (info.name == parameter) return std::holds_alternative<std::array<Real, 3>>(info.default_value);
+  } catch (const ParameterError&) {
+    // Results of plug-ins that are not linked in can be read all the same.
+  }
+  return false;
+}
+
+ParameterValues read_parameters(ComponentKind kind, const std::string& type, const Place& place) {
+  place.expect_object();
+  ParameterValues values;
+  for (const auto& [name, json] : place.json().items()) {
+    const Place value = place[name];
+    if (json.is_boolean()) {
+      values[name] = json.get<bool>();
+    } else if (json.is_number_float()) {
+      values[name] = json.get<Real>();
+    } else if (json.is_number()) {
+      values[name] = static_cast<int>(value.integer(std::numeric_limits<int>::min(), std::numeric_limits<int>::max()));
+    } else if (json.is_array()) {
+      std::vector<Real> numbers;
+      for (const Place& element : value.elements()) numbers.push_back(element.number());
+      if (numbers.size() == 3 && is_point(kind, type, name))
+        values[name] = std::array{numbers[0], numbers[1], numbers[2]};
+      else
+        values[name] = std::move(numbers);
+    } else {
+      values[name] = value.string();
+    }
+  }
+  return values;
+}
+
+Component read_component(ComponentKind kind, const Place& place) {
+  Component component;
+  component.type = place["type"].string();
+  component.values = read_parameters(kind, component.type, place["params"]);
+  component.label = place["label"].string();
+  component.pointer = place.where();
+  return component;
+}
+
+MediumSpec read_medium(const Place& place) {
+  MediumSpec medium;
+  medium.field = read_component(ComponentKind::medium, place);
+  medium.label = medium.field.label;
+  if (place.has("spectrum"))
+    for (const Place& factor : place["spectrum"].elements()) medium.spectrum.push_back(factor.number());
+  if (place.has("media"))
+    for (const Place& channel : place["media"].elements()) medium.per_channel.push_back(read_medium(channel));
+  if (place.has("optional")) medium.optional = place["optional"].boolean();
+  return medium;
+}
+
+TimeRecord read_time(const Place& place) {
+  place.expect_object();
+  TimeRecord time;
+  time.ns_per_sample = real_or_nan(place, "ns_per_sample");
+  time.ns_per_lookup = real_or_nan(place, "ns_per_lookup");
+  time.floor_ratio = real_or_nan(place, "floor_ratio");
+  time.loop_ratio = real_or_nan(place, "loop_ratio");
+  time.mad = real_or_nan(place, "mad");
+  time.repetitions = static_cast<int>(place["repetitions"].integer(0, std::numeric_limits<int>::max()));
+  time.threads = static_cast<int>(place["threads"].integer(0, std::numeric_limits<int>::max()));
+  time.samples_per_traversal = count(place, "samples_per_traversal");
+  if (place.has("repetition_ns"))
+    for (const Place& ns : place["repetition_ns"].elements()) time.repetition_ns.push_back(optional_real(ns).value_or(kNotANumber));
+  return time;
+}
+
+void read_statistics(const Place& place, CellRecord& record) {
+  record.channel.resize(static_cast<std::size_t>(record.channels));
+  const auto read = [&](const Place& object, const char* key, std::optional<Real> ChannelRecord::*member) {
+    const std::vector<std::optional<Real>> values = read_reals(object, key, record.channels);
+    for (std::size_t c = 0; c < values.size(); ++c) record.channel[c].*member = values[c];
+  };
+  read(place, "mean", &ChannelRecord::mean);
+  read(place, "bias", &ChannelRecord::bias);
+  read(place, "rmse", &ChannelRecord::rmse);
+  read(place, "rmse_theory", &ChannelRecord::rmse_theory);
+  read(place, "variance", &ChannelRecord::variance);
+  read(place, "variance_theory", &ChannelRecord::variance_theory);
+  read(place, "relative_variance", &ChannelRecord::relative_variance);
+  read(place, "kurtosis", &ChannelRecord::kurtosis);
+  read(place["reference"], "value", &ChannelRecord::reference);
+  read(place["reference"], "error", &ChannelRecord::reference_error);
+}
+
+std::vector<Table> read_tables(const Place& place) {
+  std::vector<Table> tables;
+  for (const Place& entry : place.elements()) {
+    Table table{entry["title"].string(), entry["metric"].string(), {}};
+    for (const Place& at : entry["rows"].elements()) {
+      TableRow row;
+      row.label = at["label"].string();
+      row.note = string_or_empty(at, "note");
+      at["given"].expect_object();
+      for (const auto& [heading, json] : at["given"].json().items())
+        row.given.emplace_back(heading, at["given"][heading].number());
+      at["cells"].expect_object();
+      for (const auto& [heading, json] : at["cells"].json().items())
+        row.cells.emplace_back(heading, at["cells"][heading]["cell"].string());
+      if (at.has("theory")) row.theory_of = at["theory"]["cell"].string();
+      table.rows.push_back(std::move(row));
+    }
+    tables.push_back(std::move(table));
+  }
+  return tables;
+}
+
+}  // namespace
+
+const char* to_string(Status status) { return kStatus[static_cast<std::size_t>(status)].c_str(); }
+
+Json cell_json(const CellRecord& record) {
+  const Cell& cell = record.cell;
+  Json estimator = typed(cell.estimator);
+  estimator["claims"] = record.claims;
+  estimator["range"] = record.range;
+  Json medium = typed(record.medium);
+  medium["hash"] = record.medium_hash;
+
+  Json json = {{"id", cell.id},
+               {"name", cell.name},
+               {"experiment", cell.experiment},
+               {"estimator", std::move(estimator)},
+               {"medium", std::move(medium)},
+               {"majorant", typed(record.majorant)},
+               {"ray_set", typed(record.ray_set)},
+               {"quantity", to_string(cell.quantity)},
+               {"measurement", measurement_json(cell.measurement)},
+               {"channels", record.channels},
+               {"effects", record.effects},
+               {"rays", record.rays},
+               {"samples_per_ray", cell.samples_per_ray}};
+  if (cell.equal_lookups) json["equal_lookups"] = *cell.equal_lookups;
+  json.update(Json{{"samples", record.samples},
+                   {"seed", cell.seed},
+                   {"own_streams", cell.own_streams},
+                   {"status", to_string(record.status)}});
+  if (!record.reason.empty()) json["reason"] = record.reason;
+  json.update(Json{
+      {"mean", field(record, &ChannelRecord::mean)},
+      {"reference",
+       {{"value", field(record, &ChannelRecord::reference)},
+        {"error", field(record, &ChannelRecord::reference_error)},
+        {"method", record.reference_method}}},
+      {"bias", field(record, &ChannelRecord::bias)},
+      {"rmse", field(record, &ChannelRecord::rmse)},
+      {"rmse_theory", field(record, &ChannelRecord::rmse_theory)},
+      {"variance", field(record, &ChannelRecord::variance)},
+      {"variance_theory", field(record, &ChannelRecord::variance_theory)},
+      {"variance_basis", record.variance_basis},
+      {"relative_variance", field(record, &ChannelRecord::relative_variance)},
+      {"kurtosis", field(record, &ChannelRecord::kurtosis)},
+      {"lookups_per_sample", real(record.lookups_per_sample)},
+      {"lookups_theory", real(record.lookups_theory)},
+      {"null_collisions_per_sample", real(record.null_collisions_per_sample)},
+      {"rng_draws_per_sample", real(record.draws_per_sample)},
+      {"lookups", record.lookups},
+      {"rng_draws", record.draws},
+      {"majorant_violations", record.majorant_violations},
+      {"largest_violation", real(record.largest_violation)},
+      {"nonfinite", record.nonfinite},
+      {"time", time_json(record)},
+      {"efficiency", {{"variance_x_lookups", per_channel(record, [&](std::size_t c) { return variance_x_lookups(record, c); })}}},
+      {"convergence", convergence_json(record)},
+      {"image_maximum", real(cell.image_maximum)}});
+  if (cell.images) json["images"] = record.images;
+  return json;
+}
+
+CellRecord read_cell(const Place& place) {
+  place.expect_object();
+  CellRecord record;
+  Cell& cell = record.cell;
+  cell.id = place["id"].string();
+  cell.name = place["name"].string();
+  cell.experiment = place["experiment"].string();
+  cell.estimator = read_component(ComponentKind::estimator, place["estimator"]);
+  record.claims = place["estimator"]["claims"].string();
+  record.range = place["estimator"]["range"].string();
+  record.medium = read_medium(place["medium"]);
+  record.medium_hash = string_or_empty(place["medium"], "hash");
+  record.majorant = read_component(ComponentKind::majorant, place["majorant"]);
+  record.ray_set = read_component(ComponentKind::ray_set, place["ray_set"]);
+  const std::string quantity =
+      place["quantity"].one_of({to_string(Quantity::transmittance), to_string(Quantity::optical_depth)}, "quantity");
+  cell.quantity = quantity == to_string(Quantity::transmittance) ? Quantity::transmittance : Quantity::optical_depth;
+  cell.measurement.clamp = place["measurement"]["clamp"].boolean();
+  cell.measurement.quantise_bits = static_cast<int>(place["measurement"]["quantise_bits"].integer(0, 31));
+  record.channels = static_cast<int>(place["channels"].integer(1, kMaxChannels));
+  record.effects.clear();
+  for (const Place& effect : place["effects"].elements()) record.effects.push_back(effect.string());
+  record.rays = place["rays"].unsigned_integer(0, kAny);
+  cell.samples_per_ray = place["samples_per_ray"].unsigned_integer(0, kAny);
+  cell.equal_lookups = optional_real(place, "equal_lookups");
+  record.samples = place["samples"].unsigned_integer(0, kAny);
+  cell.seed = place["seed"].unsigned_integer(0, kAny);
+  cell.own_streams = place["own_streams"].boolean();
+  const std::string status = place["status"].one_of(kStatus, "status");
+  record.status = static_cast<Status>(std::find(kStatus.begin(), kStatus.end(), status) - kStatus.begin());
+  record.reason = string_or_empty(place, "reason");
+  record.reference_method = string_or_empty(place["reference"], "method");
+  record.variance_basis = string_or_empty(place, "variance_basis");
+  if (record.samples > 0) read_statistics(place, record);
+  record.lookups_per_sample = optional_real(place, "lookups_per_sample");
+  record.lookups_theory = optional_real(place, "lookups_theory");
+  record.null_collisions_per_sample = optional_real(place, "null_collisions_per_sample");
+  record.draws_per_sample = optional_real(place, "rng_draws_per_sample");
+  record.lookups = count(place, "lookups");
+  record.draws = count(place, "rng_draws");
+  record.majorant_violations = count(place, "majorant_violations");
+  record.largest_violation = optional_real(place, "largest_violation");
+  record.nonfinite = count(place, "nonfinite");
+  if (place.has("time") && !place["time"].json().is_null()) record.time = read_time(place["time"]);
+  if (place.has("convergence"))
+    for (const Place& step : place["convergence"].elements())
+      record.convergence.push_back({step["samples"].unsigned_integer(0, kAny), read_reals(step, "rmse", record.channels),
+                                    read_reals(step, "variance", record.channels)});
+  cell.image_maximum = optional_real(place, "image_maximum").value_or(1);
+  cell.images = place.has("images");
+  if (cell.images) {
+    place["images"].expect_object();
+    for (const auto& [kind, path] : place["images"].json().items()) record.images[kind] = place["images"][kind].string();
+  }
+  return record;
+}
+
+std::string results_text(const RunRecord& run) {
+  Json provenance = Json::object();
+  for (const auto& [key, text] : run.provenance) provenance[key] = Json::parse(text);
+  std::string text = fmt::format("{{\n\"nullmark_schema\": {},\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": {},\n",
+                                 RunRecord::kSchema, Json(run.name).dump(), config_hash(run.config_text),
+                                 run.config_text.empty() ? "null" : run.config_text);
+  text += fmt::format("\"provenance\": {},\n\"cells\": [", provenance.dump());
+  for (std::size_t i = 0; i < run.cells.size(); ++i) {
+    text += i == 0 ? "\n" : ",\n";
+    text += cell_json(run.cells[i]).dump();
+  }
+  text += fmt::format("\n],\n\"tables\": {}\n}}\n", tables_json(run.tables).dump());
+  return text;
+}
+
+RunRecord read_results(const std::string& text, const std::string& file) {
+  const Json json = parse_json(text, file);
+  const Place top(json, file);
+  top.expect_object();
+  if (!top.has("nullmark_schema")) top.fail("\"nullmark_schema\" is missing; expected a results file of nullmark");
+  if (const Place schema = top["nullmark_schema"]; !json["nullmark_schema"].is_number_integer() || json["nullmark_schema"] != RunRecord::kSchema)
+    schema.expected(fmt::format("{}, the schema this program reads", RunRecord::kSchema));
+  RunRecord run;
+  run.name = top["name"].string();
+  if (!top["config"].json().is_null()) run.config_text = top["config"].json().dump();
+  top["provenance"].expect_object();
+  for (const auto& [key, value] : top["provenance"].json().items()) run.provenance[key] = value.dump();
+  for (const Place& cell : top["cells"].elements()) run.cells.push_back(read_cell(cell));
+  if (top.has("tables")) run.tables = read_tables(top["tables"]);
+  return run;
+}
+
+std::string statistics_text(const RunRecord& run) {
+  std::string text;
+  for (const CellRecord& record : run.cells) {
+    Json json = cell_json(record);
+    json.erase("time");
+    json.erase("images");
+    text += json.dump() + "\n";
+  }
+  return text;
+}
+
+}  // namespace nullmark

@@ -1,0 +1,169 @@
+#include "harness/table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "harness/metrics.h"
+#include "harness/names.h"
+#include "harness/results_json.h"
+
+namespace nullmark {
+namespace {
+
+using Line = std::vector<std::string>;
+
+/// What the cells of one table share.
+std::string heading(const CellRecord& record) {
+  const Cell& cell = record.cell;
+  std::string text = fmt::format("{}: {}, {}, {}, {}", cell.experiment, record.medium.label, record.majorant.label,
+                                 to_string(cell.quantity), record.ray_set.label);
+  if (cell.equal_lookups)
+    text += fmt::format(", {} lookups per ray", *cell.equal_lookups);
+  else
+    text += fmt::format(", {} samples per ray", cell.samples_per_ray);
+  text += fmt::format(", seed {}", cell.seed);
+  if (cell.own_streams) text += ", own streams";
+  if (cell.measurement.clamp) text += ", clamped";
+  if (cell.measurement.quantise_bits > 0) text += fmt::format(", {} bits", cell.measurement.quantise_bits);
+  return text;
+}
+
+bool heavy_tailed(const ChannelRecord& channel) { return channel.relative_variance && *channel.relative_variance > kHeavyTail; }
+
+/// The sample value, or the theory, marked, where the sample value tells little.
+std::string shown(const ChannelRecord& channel, const std::optional<Real>& value, const std::optional<Real>& theory) {
+  return heavy_tailed(channel) && theory ? short_number(theory) + "*" : short_number(value);
+}
+
+Line channel_line(const CellRecord& record, std::size_t c) {
+  const ChannelRecord& channel = record.channel[c];
+  const bool first = c == 0;
+  const auto once = [&](const std::optional<Real>& number) { return first ? short_number(number) : std::string(); };
+  return {first ? record.cell.estimator.label : fmt::format("  channel {}", c),
+          shown(channel, channel.rmse, channel.rmse_theory),
+          short_number(channel.bias),
+          shown(channel, channel.variance, channel.variance_theory),
+          short_number(channel.variance_theory),
+          once(record.lookups_per_sample),
+          once(record.lookups_theory),
+          once(metric(record, "ns_per_lookup")),
+          once(record.time ? std::optional(record.time->floor_ratio) : std::nullopt),
+          short_number(variance_x_ns(record, c)),
+          first ? to_string(record.status) + (record.reason.empty() ? "" : ": " + record.reason) : ""};
+}
+
+void append_lines(const CellRecord& record, std::vector<Line>& lines) {
+  for (std::size_t c = 0; c < record.channel.size(); ++c) lines.push_back(channel_line(record, c));
+  if (!record.channel.empty()) return;
+  Line line(lines[0].size(), "-");
+  line.front() = record.cell.estimator.label;
+  line.back() = to_string(record.status) + (record.reason.empty() ? "" : ": " + record.reason);
+  lines.push_back(line);
+}
+
+/// In order of first appearance.
+template <class Item, class Key>
+std::vector<std::pair<std::string, std::vector<const Item*>>> grouped(const std::vector<Item>& items, const Key& key) {
+  std::vector<std::pair<std::string, std::vector<const Item*>>> groups;
+  std::map<std::string, std::size_t> index;
+  for (const Item& item : items) {
+    const auto [at, added] = index.emplace(key(item), groups.size());
+    if (added) groups.push_back({at->first, {}});
+    groups[at->second].second.push_back(&item);
+  }
+  return groups;
+}
+
+template <class Value>
+void add_headings(const std::vector<std::pair<std::string, Value>>& words, std::vector<std::string>& headings) {
+  for (const auto& [word, value] : words)
+    if (std::find(headings.begin(), headings.end(), word) == headings.end()) headings.push_back(word);
+}
+
+template <class Value>
+const Value* value_under(const std::vector<std::pair<std::string, Value>>& row, const std::string& heading) {
+  for (const auto& [word, value] : row)
+    if (word == heading) return &value;
+  return nullptr;
+}
+
+std::string side_by_side(const Table& table, const std::map<std::string, const CellRecord*>& cells) {
+  std::vector<std::string> given, answered;
+  bool theory = false, note = false;
+  for (const TableRow& row : table.rows) {
+    add_headings(row.given, given);
+    add_headings(row.cells, answered);
+    theory |= row.theory_of.has_value();
+    note |= !row.note.empty();
+  }
+  Line head = {""};
+  head.insert(head.end(), given.begin(), given.end());
+  head.insert(head.end(), answered.begin(), answered.end());
+  if (theory) head.emplace_back("theory");
+  head.emplace_back(note ? "note" : "");
+
+  std::vector<Line> lines = {head};
+  for (const TableRow& row : table.rows) {
+    Line line = {row.label};
+    const auto cell_value = [&](const std::string& name, auto value) -> std::optional<Real> {
+      const auto at = cells.find(name);
+      return at == cells.end() ? std::nullopt : value(*at->second, table.metric);
+    };
+    for (const std::string& word : given) {
+      const Real* number = value_under(row.given, word);
+      line.push_back(number ? fmt::format("{}", *number) : "-");
+    }
+    for (const std::string& word : answered) {
+      const std::string* name = value_under(row.cells, word);
+      line.push_back(name ? short_number(cell_value(*name, metric)) : "-");
+    }
+    if (theory) line.push_back(row.theory_of ? short_number(cell_value(*row.theory_of, metric_theory)) : "-");
+    line.push_back(row.note);
+    lines.push_back(std::move(line));
+  }
+  return fmt::format("{} ({})\n{}", table.title, table.metric, aligned(lines, 1));
+}
+
+}  // namespace
+
+std::string short_number(const std::optional<Real>& number) { return number ? fmt::format("{:.4g}", *number) : "-"; }
+
+std::string aligned(const std::vector<std::vector<std::string>>& lines, std::size_t left) {
+  std::vector<std::size_t> width(lines[0].size(), 0);
+  for (const Line& line : lines)
+    for (std::size_t i = 0; i < line.size(); ++i) width[i] = std::max(width[i], line[i].size());
+  std::string text;
+  for (const Line& line : lines) {
+    std::string row;
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      if (i > 0) row += "  ";
+      row += i < left || i + 1 == line.size() ? fmt::format("{:<{}}", line[i], width[i]) : fmt::format("{:>{}}", line[i], width[i]);
+    }
+    row.erase(row.find_last_not_of(' ') + 1);
+    text += row + "\n";
+  }
+  return text;
+}
+
+std::string results_tables(const RunRecord& run) {
+  std::string text;
+  bool marked = false;
+  for (const auto& [title, records] : grouped(run.cells, heading)) {
+    std::vector<Line> lines = {{"estimator", "rmse", "bias", "variance", "variance theory", "lookups", "lookups theory", "ns/lookup",
+                                "floor ratio", "variance x ns", "status"}};
+    for (const CellRecord* record : records) {
+      append_lines(*record, lines);
+      for (const ChannelRecord& channel : record->channel) marked |= heavy_tailed(channel) && channel.variance_theory;
+    }
+    text += title + "\n" + aligned(lines, 1) + "\n";
+  }
+  if (marked) text += fmt::format("* theory: the relative variance is above {}, too heavy a tail for the sample's own\n\n", kHeavyTail);
+  std::map<std::string, const CellRecord*> cells;
+  for (const CellRecord& record : run.cells) cells[record.cell.name] = &record;
+  for (const Table& table : run.tables) text += side_by_side(table, cells) + "\n";
+  return text;
+}
+
+}  // namespace nullmark
