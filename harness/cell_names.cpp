@@ -19,12 +19,13 @@ std::array<std::string, 6> distinctions(const Plan& plan, const Cell& cell) {
   const Measurement& measurement = cell.measurement;
   std::string measured = measurement.clamp ? "clamped" : "unclamped";
   if (measurement.quantise_bits > 0) measured += fmt::format("/quantise_bits:{}", measurement.quantise_bits);
-  return {fmt::format("seed:{}", cell.seed),
-          to_string(cell.quantity),
-          plan.ray_sets[cell.rays].label,
-          cell.equal_lookups ? fmt::format("equal_lookups:{}", *cell.equal_lookups) : fmt::format("samples:{}", cell.samples_per_ray),
-          measured,
-          cell.own_streams ? "own_streams" : "common_streams"};
+  return {
+      fmt::format("seed:{}", cell.seed),
+      to_string(cell.quantity),
+      plan.ray_sets[cell.rays].label,
+      cell.equal_lookups ? fmt::format("equal_lookups:{}", *cell.equal_lookups) : fmt::format("samples:{}", cell.samples_per_ray),
+      measured,
+      cell.own_streams ? "own_streams" : "common_streams"};
 }
 
 std::map<std::string, std::vector<Cell*>> cells_by_name(Plan& plan) {

@@ -93,7 +93,8 @@ class CommandLine {
   void add_run() {
     CLI::App* command = add("run", "Run configurations and write their results", [this] { return run_command(run_); });
     command->add_option("CONFIG", run_.configs, "Configuration files, folders of them, or - for standard input")->required();
-    command->add_option("-o,--output", run_.output, "Results file (default: CONFIG's stem + .results.json); - for standard output");
+    command->add_option("-o,--output", run_.output,
+                        "Results file (default: CONFIG's stem + .results.json); - for standard output");
     command->add_option("--threads", run_.threads, "Threads; 0: all cores.  Results do not depend on it")
         ->check(CLI::Range(0, 4096));
     command->add_option("--seed", run_.seed, "Seed in place of the configuration's, or \"random\"");
@@ -148,7 +149,8 @@ class CommandLine {
 
   void add_merge() {
     CLI::App* command = add("merge", "Join the results of shards", [this] {
-      if (!force_ && output_ != "-" && std::filesystem::exists(output_)) throw InputError(output_ + ": exists; --force replaces it");
+      if (!force_ && output_ != "-" && std::filesystem::exists(output_))
+        throw InputError(output_ + ": exists; --force replaces it");
       deliver(results_text(merge_results(load_all(files_), files_)), output_);
       return ExitCode::ok;
     });
@@ -202,7 +204,8 @@ ExitCode guarded(int argc, char** argv) {
 int nullmark_main(int argc, char** argv) {
   ExitCode code = guarded(argc, argv);
   // A full disk or a closed pipe shows only here.
-  if (std::fflush(stdout) != 0 && code == ExitCode::ok) code = report(ExitCode::internal_error, "standard output cannot be written");
+  if (std::fflush(stdout) != 0 && code == ExitCode::ok)
+    code = report(ExitCode::internal_error, "standard output cannot be written");
   return static_cast<int>(code);
 }
 

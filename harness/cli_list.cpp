@@ -10,7 +10,8 @@ namespace nullmark {
 namespace {
 
 const std::vector<std::pair<Quantity, const char*>> kQuantities = {
-    {Quantity::transmittance, "T = exp(-tau) along each ray"}, {Quantity::optical_depth, "tau, the integral of extinction along each ray"}};
+    {Quantity::transmittance, "T = exp(-tau) along each ray"},
+    {Quantity::optical_depth, "tau, the integral of extinction along each ray"}};
 
 Json parameters_list(ComponentKind kind, const std::string& type) {
   Json list = Json::array();
@@ -28,8 +29,7 @@ void add_traits(const std::string& name, Json& json) {
   const EstimatorEntry& entry = *Registry<EstimatorEntry>::instance().find(name);
   const std::unique_ptr<EstimatorSource> source = entry.make();
   Json claims = {{to_string(Quantity::transmittance), to_string(source->claim(Quantity::transmittance))}};
-  if (entry.answers_optical_depth)
-    claims[to_string(Quantity::optical_depth)] = to_string(source->claim(Quantity::optical_depth));
+  if (entry.answers_optical_depth) claims[to_string(Quantity::optical_depth)] = to_string(source->claim(Quantity::optical_depth));
   json["claims"] = std::move(claims);
   json["range"] = to_string(entry.range);
   json["needs_bound"] = entry.needs_bound;

@@ -125,9 +125,10 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
     total_lookups += lookups.value_or(0);
     all_known &= lookups.has_value();
   }
-  fmt::print("{}\n{} cells, {:.4g} samples, {}{:.4g} lookups, about {:.3g} s of one core at {} ns per lookup, timing not counted\n",
-             aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
-             total_lookups * kNsPerLookup * 1e-9, kNsPerLookup);
+  fmt::print(
+      "{}\n{} cells, {:.4g} samples, {}{:.4g} lookups, about {:.3g} s of one core at {} ns per lookup, timing not counted\n",
+      aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
+      total_lookups * kNsPerLookup * 1e-9, kNsPerLookup);
   return ExitCode::ok;
 }
 

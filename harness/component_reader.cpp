@@ -26,8 +26,8 @@ Real number_within(const Place& place, const Range& range, const std::string& un
 
 std::vector<Real> numbers_within(const Place& place, std::size_t least, std::size_t most, const Range& range,
                                  const std::string& unit) {
-  const std::string length = least == most ? fmt::format("a list of {} numbers", least)
-                                           : fmt::format("a list of {} to {} numbers", least, most);
+  const std::string length =
+      least == most ? fmt::format("a list of {} numbers", least) : fmt::format("a list of {} to {} numbers", least, most);
   if (!place.json().is_array() || place.json().size() < least || place.json().size() > most) place.expected(length);
   std::vector<Real> values;
   for (const Place& element : place.elements()) values.push_back(number_within(element, range, unit));
@@ -41,10 +41,14 @@ bool holds_list(const ParameterInfo& parameter) {
 
 ParameterValue read_value(const ParameterInfo& parameter, const Place& place) {
   switch (parameter.default_value.index()) {
-    case 0: return number_within(place, parameter.range, parameter.unit);
-    case 1: return static_cast<int>(place.integer(parameter.low, parameter.high));
-    case 2: return place.boolean();
-    case 3: return parameter.allowed.empty() ? place.string() : place.one_of(parameter.allowed, parameter.name.c_str());
+    case 0:
+      return number_within(place, parameter.range, parameter.unit);
+    case 1:
+      return static_cast<int>(place.integer(parameter.low, parameter.high));
+    case 2:
+      return place.boolean();
+    case 3:
+      return parameter.allowed.empty() ? place.string() : place.one_of(parameter.allowed, parameter.name.c_str());
     case 4:
       return numbers_within(place, static_cast<std::size_t>(parameter.least), static_cast<std::size_t>(parameter.most),
                             parameter.range, parameter.unit);
@@ -156,8 +160,8 @@ std::vector<MediumSpec> read_given_media(const Place& place) {
       const std::vector<MediumSpec> variants = read_given_media(channel);
       if (!variants[0].spectrum.empty() || !variants[0].per_channel.empty())
         channel.fail("a channel's medium must be grey; expected neither \"spectrum\" nor \"channels\" inside \"channels\"");
-      media = crossed(media, variants,
-                      [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
+      media =
+          crossed(media, variants, [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
     }
     return media;
   }
@@ -198,7 +202,8 @@ std::vector<MediumSpec> read_medium_patterns(const Place& place) {
   std::vector<MediumSpec> patterns;
   for (const Place& entry : place.elements_or_self()) {
     // "channels" alone is a pattern, though no medium.
-    if (entry.json() == kChannels || (entry.json().is_object() && entry.json().size() == 1 && entry["type"].json() == kChannels)) {
+    if (entry.json() == kChannels ||
+        (entry.json().is_object() && entry.json().size() == 1 && entry["type"].json() == kChannels)) {
       MediumSpec any_channels;
       any_channels.field.type = kChannels;
       patterns.push_back(any_channels);

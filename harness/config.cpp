@@ -131,7 +131,8 @@ void apply_single(const Place& object, const std::string& key, Draft& draft) {
   if (!object.has(key.c_str())) return;
   const Place place = object[key];
   const std::vector<Setter> values = read_axis(key, place);
-  if (values.size() != 1) place.fail(fmt::format("found {} values; expected one here, sweeps belong into \"matrix\"", values.size()));
+  if (values.size() != 1)
+    place.fail(fmt::format("found {} values; expected one here, sweeps belong into \"matrix\"", values.size()));
   values[0](draft);
 }
 
@@ -162,7 +163,8 @@ Test read_test(const std::string& key, const Place& place) {
   if (key == "quantity")
     return any_matches(each(place, read_quantity), [](const Draft& d, Quantity q) { return d.cell.quantity == q; });
   if (key == "measurement")
-    return any_matches(each(place, read_measurement), [](const Draft& d, const Measurement& m) { return d.cell.measurement == m; });
+    return any_matches(each(place, read_measurement),
+                       [](const Draft& d, const Measurement& m) { return d.cell.measurement == m; });
   if (key == "seed")
     return any_matches(each(place, [](const Place& at) { return at.unsigned_integer(0, kAny); }),
                        [](const Draft& d, std::uint64_t seed) { return d.cell.seed == seed; });
@@ -327,10 +329,10 @@ class PlanBuilder {
 };
 
 bool same_statistics(const Draft& a, const Draft& b) {
-  return a.cell.experiment == b.cell.experiment && a.estimator == b.estimator && a.medium == b.medium && a.majorant == b.majorant &&
-         a.rays == b.rays && a.cell.quantity == b.cell.quantity && a.cell.measurement == b.cell.measurement &&
-         a.cell.samples_per_ray == b.cell.samples_per_ray && a.cell.equal_lookups == b.cell.equal_lookups &&
-         a.cell.seed == b.cell.seed && a.cell.own_streams == b.cell.own_streams;
+  return a.cell.experiment == b.cell.experiment && a.estimator == b.estimator && a.medium == b.medium &&
+         a.majorant == b.majorant && a.rays == b.rays && a.cell.quantity == b.cell.quantity &&
+         a.cell.measurement == b.cell.measurement && a.cell.samples_per_ray == b.cell.samples_per_ray &&
+         a.cell.equal_lookups == b.cell.equal_lookups && a.cell.seed == b.cell.seed && a.cell.own_streams == b.cell.own_streams;
 }
 
 TimingPlan read_timing(const Place& place) {
@@ -395,7 +397,8 @@ Selector read_selector(const Place& place, const std::vector<Draft>& drafts, con
   }
   if (found.empty()) place.fail("matches no cell; expected exactly one");
   if (found.size() > 1)
-    place.fail(fmt::format("matches {} cells, among them \"{}\" and \"{}\"; expected exactly one", found.size(), found[0], found[1]));
+    place.fail(
+        fmt::format("matches {} cells, among them \"{}\" and \"{}\"; expected exactly one", found.size(), found[0], found[1]));
   return selector;
 }
 
@@ -471,8 +474,9 @@ void tell_experiments_apart(std::vector<DraftPlan>& files) {
       std::string& name = draft.cell.experiment;
       if (owners[name].size() > 1) name = files[i].name + "." + name;
       if (const auto [at, added] = taken.emplace(name, i); !added && at->second != i)
-        throw InputError(fmt::format("{}: experiment \"{}\" stands in {} as well; expected another \"name\" of the file or experiment",
-                                     files[i].file, name, files[at->second].file));
+        throw InputError(
+            fmt::format("{}: experiment \"{}\" stands in {} as well; expected another \"name\" of the file or experiment",
+                        files[i].file, name, files[at->second].file));
     }
 }
 
@@ -506,8 +510,8 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
   for (const DraftPlan& file : files) {
     plan.name += (plan.name.empty() ? "" : "+") + file.name;
     if (!agree(file.timing, plan.timing))
-      throw InputError(fmt::format("{}: /timing: differs from that of {}; expected the same, or run the files one by one", file.file,
-                                   files.front().file));
+      throw InputError(fmt::format("{}: /timing: differs from that of {}; expected the same, or run the files one by one",
+                                   file.file, files.front().file));
     for (const Draft& draft : file.cells) builder.add(draft);
   }
   name_cells(plan);

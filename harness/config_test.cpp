@@ -14,7 +14,8 @@ namespace {
 
 /// A configuration of one experiment with the given keys beside a name, rays and sample count.
 std::string experiment(const std::string& keys) {
-  return R"({"$schema":"nullmark/config/1","name":"t","experiments":[{"name":"e","rays":"single","samples_per_ray":10,)" + keys + "}]}";
+  return R"({"$schema":"nullmark/config/1","name":"t","experiments":[{"name":"e","rays":"single","samples_per_ray":10,)" + keys +
+         "}]}";
 }
 
 Plan plan_of(const std::string& keys) { return read_config(experiment(keys), "t.json"); }
@@ -49,17 +50,17 @@ TEST(Config, CrossesAxesAndSweptParametersFirstKeySlowest) {
 TEST(Config, ListParametersAreSweptByListsOfLists) {
   const Plan plan = plan_of(
       R"("matrix":{"estimator":"ratio","medium":[{"type":"layers","values":[1,2,3]},{"type":"layers","values":[[1,2],[3]],"lo":[[0,0,0],[-1,0,0]]}]})");
-  EXPECT_EQ(names(plan),
-            (Names{"ratio/layers/values:1,2,3/global", "ratio/layers/values:1,2/global", "ratio/layers/values:1,2/lo:-1,0,0/global",
-                   "ratio/layers/values:3/global", "ratio/layers/values:3/lo:-1,0,0/global"}));
+  EXPECT_EQ(names(plan), (Names{"ratio/layers/values:1,2,3/global", "ratio/layers/values:1,2/global",
+                                "ratio/layers/values:1,2/lo:-1,0,0/global", "ratio/layers/values:3/global",
+                                "ratio/layers/values:3/lo:-1,0,0/global"}));
 }
 
 TEST(Config, SpectraAndChannels) {
-  const Plan plan = plan_of(
-      R"("matrix":{"estimator":"ratio","medium":[{"type":"linear","spectrum":[[1,2],[3,4,5]]},)"
-      R"({"type":"channels","optional":true,"media":["homogeneous",{"type":"linear","end":[3,4]}]}]})");
-  ASSERT_EQ(names(plan), (Names{"ratio/linear/spectrum:1,2/global", "ratio/linear/spectrum:3,4,5/global",
-                                "ratio/channels(homogeneous|linear/end:3)/global", "ratio/channels(homogeneous|linear/end:4)/global"}));
+  const Plan plan = plan_of(R"("matrix":{"estimator":"ratio","medium":[{"type":"linear","spectrum":[[1,2],[3,4,5]]},)"
+                            R"({"type":"channels","optional":true,"media":["homogeneous",{"type":"linear","end":[3,4]}]}]})");
+  ASSERT_EQ(names(plan),
+            (Names{"ratio/linear/spectrum:1,2/global", "ratio/linear/spectrum:3,4,5/global",
+                   "ratio/channels(homogeneous|linear/end:3)/global", "ratio/channels(homogeneous|linear/end:4)/global"}));
   EXPECT_EQ(plan.media[1].spectrum, (std::vector<Real>{3, 4, 5}));
   EXPECT_EQ(plan.media[3].per_channel.size(), 2u);
   EXPECT_TRUE(plan.media[3].optional);
@@ -81,8 +82,8 @@ TEST(Config, ExcludeConstraintsAndInclude) {
       R"("exclude":[{"estimator":"ratio","medium":"homogeneous"},{"majorant":{"type":"grid","resolution":4}}],)"
       R"("constraints":[{"if":{"estimator":["delta","residual_ratio"]},"then":{"majorant":"global"}}],)"
       R"("include":[{"estimator":"delta","medium":{"type":"homogeneous","extinction":3},"samples_per_ray":7,"seed":9}])");
-  EXPECT_EQ(names(plan), (Names{"ratio/linear/global", "ratio/linear/grid/resolution:8", "delta/linear/global", "delta/homogeneous/global",
-                                "residual_ratio/linear/global", "residual_ratio/homogeneous/global",
+  EXPECT_EQ(names(plan), (Names{"ratio/linear/global", "ratio/linear/grid/resolution:8", "delta/linear/global",
+                                "delta/homogeneous/global", "residual_ratio/linear/global", "residual_ratio/homogeneous/global",
                                 "delta/homogeneous/extinction:3/global"}));
   EXPECT_EQ(plan.cells.back().samples_per_ray, 7u);
   EXPECT_EQ(plan.cells.back().seed, 9u);
@@ -116,19 +117,23 @@ TEST(Config, IdsTellAllThatDecidesTheStatisticsAndNothingElse) {
       cell + R"(,"measurement":{"quantise_bits":8})"};
   for (const std::string& keys : different) ids.insert(plan_of(keys).cells.at(0).id);
   EXPECT_EQ(ids.size(), different.size());
-  for (const std::string& keys : {cell + R"(,"images":true,"image_maximum":2)",
-                                  std::string(R"("matrix":{"medium":{"end":1,"type":"linear","optional":true},"estimator":[{"type":"residual_ratio","control":"minimum"}]})")})
+  for (
+      const std::string& keys :
+      {cell + R"(,"images":true,"image_maximum":2)",
+       std::string(
+           R"("matrix":{"medium":{"end":1,"type":"linear","optional":true},"estimator":[{"type":"residual_ratio","control":"minimum"}]})")})
     EXPECT_EQ(plan_of(keys).cells.at(0).id, plan_of(cell).cells.at(0).id);
 }
 
 TEST(Config, AppliedConfigurationGivesTheSamePlan) {
-  const Plan plan = read_config(R"({"$schema":"nullmark/config/1","name":"round","seed":18446744073709551615,"timing":{"seconds":0.1},"experiments":[
+  const Plan plan = read_config(
+      R"({"$schema":"nullmark/config/1","name":"round","seed":18446744073709551615,"timing":{"seconds":0.1},"experiments":[
     {"name":"a","rays":{"type":"orthographic","width":4,"height":3},"equal_lookups":100.5,"images":true,"own_streams":true,
      "measurement":{"clamp":true,"quantise_bits":8},"matrix":{"estimator":["ratio",{"type":"residual_ratio","value":0.1}],
      "medium":[{"type":"linear","spectrum":[0.1,2],"optional":true},{"type":"channels","media":["linear","homogeneous"]}]}}],
     "tables":[{"title":"T","metric":"variance","rows":[{"label":"R","given":{"p":0.25},"note":"n",
      "cells":{"c":{"experiment":"a","estimator":"ratio","medium":"channels"}},"theory":{"estimator":"ratio","medium":{"type":"linear"}}}]}]})",
-                                "t.json");
+      "t.json");
   ASSERT_EQ(plan.cells.size(), 4u);
   EXPECT_EQ(plan.cells[0].seed, 18446744073709551615u);
   EXPECT_EQ(plan.cells[0].equal_lookups, 100.5);
@@ -137,16 +142,22 @@ TEST(Config, AppliedConfigurationGivesTheSamePlan) {
   const Plan again = read_config(plan.config_text, "applied.json");
   EXPECT_EQ(again.config_text, plan.config_text);
   ASSERT_EQ(names(again), names(plan));
-  for (std::size_t i = 0; i < plan.cells.size(); ++i) EXPECT_EQ(again.cells[i].id, plan.cells[i].id);
+  for (std::size_t i = 0; i < plan.cells.size(); ++i) {
+    EXPECT_EQ(again.cells[i].id, plan.cells[i].id);
+    EXPECT_TRUE(again.cells[i].images);
+  }
   EXPECT_EQ(again.media, plan.media);
+  EXPECT_TRUE(again.media[0].optional);
+  EXPECT_EQ(again.timing.seconds, 0.1);
 }
 
 TEST(Config, SeveralFilesKeepExperimentsApart) {
   const auto source = [](const std::string& name, const std::string& more = "") {
-    return ConfigSource{R"({"$schema":"nullmark/config/1","name":")" + name + "\"" + more +
-                            R"(,"experiments":[{"name":"e","rays":"single","samples_per_ray":10,"matrix":{"estimator":"ratio","medium":"linear"}}],
+    return ConfigSource{
+        R"({"$schema":"nullmark/config/1","name":")" + name + "\"" + more +
+            R"(,"experiments":[{"name":"e","rays":"single","samples_per_ray":10,"matrix":{"estimator":"ratio","medium":"linear"}}],
         "tables":[{"title":"T","rows":[{"label":"R","cells":{"c":{"experiment":"e"}}}]}]})",
-                        name + ".json"};
+        name + ".json"};
   };
   const Plan plan = read_configs({source("a"), source("b")});
   EXPECT_EQ(names(plan), (Names{"a.e/ratio/linear/global", "b.e/ratio/linear/global"}));
@@ -190,7 +201,8 @@ TEST(Config, ErrorsAreOneLineWithPlaceAndRemedy) {
        R"(t.json: /experiments/0/samples_per_ray: found here and in "matrix"; expected one of the two)"},
       {experiment(R"("matrix":{"estimator":"ratio","medium":"linear"},"qantity":"transmittance")"),
        R"(t.json: /experiments/0/qantity: unknown key "qantity"; did you mean "quantity"?)"},
-      {head + R"("experiments":[{"name":"e","rays":"single","samples_per_ray":0,"matrix":{"estimator":"ratio","medium":"linear"}}]})",
+      {head +
+           R"("experiments":[{"name":"e","rays":"single","samples_per_ray":0,"matrix":{"estimator":"ratio","medium":"linear"}}]})",
        R"(t.json: /experiments/0/samples_per_ray: found 0; expected a whole number from 1 to 9007199254740992)"},
       {head + R"("experiments":[{"name":"e","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":"linear"}}]})",
        R"(t.json: /experiments/0: "rays" is missing; expected it here or in "matrix")"},
@@ -208,18 +220,21 @@ TEST(Config, ErrorsAreOneLineWithPlaceAndRemedy) {
 TEST(Config, SelectorsMatchExactlyOneCell) {
   const auto with_selector = [](const std::string& selector) {
     return R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}],
-      "tables":[{"title":"T","rows":[{"label":"R","cells":{"c":)" + selector + "}}]}]}";
+      "tables":[{"title":"T","rows":[{"label":"R","cells":{"c":)" +
+           selector + "}}]}]}";
   };
   EXPECT_EQ(error_of(with_selector(R"({"experiment":"e","estimator":"ratio"})")), "no error");
-  EXPECT_EQ(error_of(with_selector(R"({"experiment":"e"})")),
-            "t.json: /tables/0/rows/0/cells/c: matches 2 cells, among them \"e: ratio/linear/global\" and \"e: delta/linear/global\"; "
-            "expected exactly one");
+  EXPECT_EQ(
+      error_of(with_selector(R"({"experiment":"e"})")),
+      "t.json: /tables/0/rows/0/cells/c: matches 2 cells, among them \"e: ratio/linear/global\" and \"e: delta/linear/global\"; "
+      "expected exactly one");
   EXPECT_EQ(error_of(with_selector(R"({"estimator":"residual_ratio"})")),
             "t.json: /tables/0/rows/0/cells/c: matches no cell; expected exactly one");
 }
 
 TEST(Config, CommentKeysAreIgnoredEverywhere) {
-  EXPECT_EQ(names(plan_of(R"("x-a":1,"matrix":{"x-b":[],"estimator":{"type":"ratio","x-c":{}},"medium":{"type":"linear","x-d":[1,2]}})")),
+  EXPECT_EQ(names(plan_of(
+                R"("x-a":1,"matrix":{"x-b":[],"estimator":{"type":"ratio","x-c":{}},"medium":{"type":"linear","x-d":[1,2]}})")),
             Names{"ratio/linear/global"});
 }
 
@@ -257,7 +272,8 @@ TEST(ParameterValues, AssignedValuesReachTheComponent) {
 }
 
 TEST(ParameterValues, DefaultsLieWithinTheirRanges) {
-  for (const ComponentKind kind : {ComponentKind::estimator, ComponentKind::medium, ComponentKind::majorant, ComponentKind::ray_set})
+  for (const ComponentKind kind :
+       {ComponentKind::estimator, ComponentKind::medium, ComponentKind::majorant, ComponentKind::ray_set})
     for (const ComponentInfo& entry : registered(kind))
       for (const ParameterInfo& parameter : parameters_of(kind, entry.name)) {
         SCOPED_TRACE(entry.name + "/" + parameter.name);

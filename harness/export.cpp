@@ -22,7 +22,8 @@ std::string benchmark_name(const Cell& cell) {
 }
 
 std::string google_benchmark(const RunRecord& run, const std::string& file) {
-  const Json cpu = provenance_value(run, "cpu"), compiler = provenance_value(run, "compiler"), start = provenance_value(run, "start");
+  const Json cpu = provenance_value(run, "cpu"), compiler = provenance_value(run, "compiler"),
+             start = provenance_value(run, "start");
   const bool debug = compiler.is_object() && compiler.value("build_type", "") == "Debug";
   Json rows = Json::array();
   int family = 0;
@@ -141,12 +142,21 @@ std::string jsonl(const RunRecord& run) {
 std::string xml(const std::string& text) {
   std::string result;
   for (const char c : text) switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
       // XML has no way to write control characters.
-      default: result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+      default:
+        result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
     }
   return result;
 }
@@ -185,7 +195,8 @@ std::string junit(const RunRecord& run, const std::string& file) {
   const std::string counts =
       fmt::format("tests=\"{}\" failures=\"0\" errors=\"{}\" skipped=\"{}\"", run.cells.size(), errors, skipped);
   return fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites {0}>\n  <testsuite name=\"{1}\" {0}>\n{2}  </testsuite>\n</testsuites>\n",
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites {0}>\n  <testsuite name=\"{1}\" {0}>\n{2}  "
+      "</testsuite>\n</testsuites>\n",
       counts, xml(run.name), cases);
 }
 

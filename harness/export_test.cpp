@@ -16,8 +16,8 @@ TEST(Export, GoogleBenchmarkHasARowPerTimedRepetition) {
   RunRecord run = example_results();
   run.cells[1].time.reset();
   const Json json = Json::parse(export_results(run, "google-benchmark", "r.json"));
-  for (const char* key : {"date", "host_name", "executable", "num_cpus", "mhz_per_cpu", "caches", "load_avg", "library_build_type",
-                          "json_schema_version"})
+  for (const char* key : {"date", "host_name", "executable", "num_cpus", "mhz_per_cpu", "caches", "load_avg",
+                          "library_build_type", "json_schema_version"})
     EXPECT_TRUE(json["context"].contains(key)) << key;
   EXPECT_EQ(json["context"]["num_cpus"], 8);
   ASSERT_EQ(json["benchmarks"].size(), 6u);

@@ -151,9 +151,7 @@ std::vector<Place> Place::elements() const {
   return result;
 }
 
-std::vector<Place> Place::elements_or_self() const {
-  return value_->is_array() ? elements() : std::vector<Place>{*this};
-}
+std::vector<Place> Place::elements_or_self() const { return value_->is_array() ? elements() : std::vector<Place>{*this}; }
 
 void Place::expect_object() const {
   if (!value_->is_object()) expected("an object");

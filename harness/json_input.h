@@ -25,8 +25,8 @@ Json parse_json(const std::string& text, const std::string& file);
 /// The candidate fewest edits away from a misspelt word; empty where none is near.
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates);
 
-/// A value in a JSON document and where it stands; its getters throw InputError with file and JSON pointer where it is not what is
-/// asked for.
+/// A value in a JSON document and where it stands; its getters throw InputError with file and JSON pointer where it is not what
+/// is asked for.
 class Place {
  public:
   Place(const Json& value, std::string file, std::string pointer = "")

@@ -46,8 +46,8 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
       if (added) continue;
       const CellRecord& other = *at->second.record;
       if (sampled(record) && sampled(other) && statistics_of(record) != statistics_of(other))
-        throw InputError(fmt::format("{}: cell \"{}\" has other statistics than in {}; expected the same to the last bit", names[part],
-                                     record.cell.name, names[at->second.part]));
+        throw InputError(fmt::format("{}: cell \"{}\" has other statistics than in {}; expected the same to the last bit",
+                                     names[part], record.cell.name, names[at->second.part]));
       at->second.record = better(at->second.record, &record);
     }
   }
@@ -69,7 +69,8 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
       cells.erase(at);
     }
   if (!cells.empty())
-    throw InputError(fmt::format("{}: cell \"{}\" is not of its configuration", names[cells.begin()->second.part], cells.begin()->first));
+    throw InputError(
+        fmt::format("{}: cell \"{}\" is not of its configuration", names[cells.begin()->second.part], cells.begin()->first));
   return merged;
 }
 

@@ -35,8 +35,8 @@ std::optional<Real> best_variance(const CellRecord& record, std::size_t channel)
 }  // namespace
 
 const std::vector<std::string>& metric_names() {
-  static const std::vector<std::string> kNames = {"mean",          "bias",     "rmse",
-                                                  "variance",      "kurtosis", "relative_variance",
+  static const std::vector<std::string> kNames = {"mean",          "bias",          "rmse",
+                                                  "variance",      "kurtosis",      "relative_variance",
                                                   "ns_per_sample", "ns_per_lookup", "lookups_per_sample"};
   return kNames;
 }

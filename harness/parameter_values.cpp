@@ -97,8 +97,7 @@ class Assign final : public ParameterVisitor {
 
   void refuse_the_rest() const {
     for (const auto& [name, value] : component_.values)
-      if (!told_.contains(name))
-        throw ParameterError(name, fmt::format("{} has no parameter \"{}\"", component_.type, name));
+      if (!told_.contains(name)) throw ParameterError(name, fmt::format("{} has no parameter \"{}\"", component_.type, name));
   }
 
  private:
@@ -110,8 +109,8 @@ class Assign final : public ParameterVisitor {
     if (const Value* value = std::get_if<Value>(&at->second))
       field = *value;
     else
-      throw ParameterError(name, fmt::format("{} has another type than {}'s parameter \"{}\"", to_text(at->second),
-                                             component_.type, name));
+      throw ParameterError(
+          name, fmt::format("{} has another type than {}'s parameter \"{}\"", to_text(at->second), component_.type, name));
   }
 
   const Component& component_;
@@ -151,30 +150,42 @@ std::vector<ParameterInfo> describe(ComponentKind kind, std::string_view type) {
 
 const char* to_string(ComponentKind kind) {
   switch (kind) {
-    case ComponentKind::estimator: return "estimator";
-    case ComponentKind::medium: return "medium";
-    case ComponentKind::majorant: return "majorant";
-    case ComponentKind::ray_set: break;
+    case ComponentKind::estimator:
+      return "estimator";
+    case ComponentKind::medium:
+      return "medium";
+    case ComponentKind::majorant:
+      return "majorant";
+    case ComponentKind::ray_set:
+      break;
   }
   return "ray set";
 }
 
 std::vector<ComponentInfo> registered(ComponentKind kind) {
   switch (kind) {
-    case ComponentKind::estimator: return entries<EstimatorEntry>();
-    case ComponentKind::medium: return entries<MediumEntry>();
-    case ComponentKind::majorant: return entries<MajorantEntry>();
-    case ComponentKind::ray_set: break;
+    case ComponentKind::estimator:
+      return entries<EstimatorEntry>();
+    case ComponentKind::medium:
+      return entries<MediumEntry>();
+    case ComponentKind::majorant:
+      return entries<MajorantEntry>();
+    case ComponentKind::ray_set:
+      break;
   }
   return entries<RaySetEntry>();
 }
 
 std::vector<ParameterInfo> parameters_of(ComponentKind kind, std::string_view type) {
   switch (kind) {
-    case ComponentKind::estimator: return describe<EstimatorEntry>(kind, type);
-    case ComponentKind::medium: return describe<MediumEntry>(kind, type);
-    case ComponentKind::majorant: return describe<MajorantEntry>(kind, type);
-    case ComponentKind::ray_set: break;
+    case ComponentKind::estimator:
+      return describe<EstimatorEntry>(kind, type);
+    case ComponentKind::medium:
+      return describe<MediumEntry>(kind, type);
+    case ComponentKind::majorant:
+      return describe<MajorantEntry>(kind, type);
+    case ComponentKind::ray_set:
+      break;
   }
   return describe<RaySetEntry>(kind, type);
 }

@@ -1,16 +1,14 @@
 #include "harness/provenance.h"
 
-#include "commit.h"
-
-#include <CLI/Version.hpp>
-#include <Eigen/Core>
-#include <boost/version.hpp>
 #include <features.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <openvdb/version.h>
 #include <tbb/version.h>
 
+#include <CLI/Version.hpp>
+#include <Eigen/Core>
+#include <boost/version.hpp>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -69,8 +67,8 @@ Json libraries() {
           {"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
           {"boost", fmt::format("{}.{}.{}", BOOST_VERSION / 100000, BOOST_VERSION / 100 % 1000, BOOST_VERSION % 100)},
           {"fmt", fmt::format("{}.{}.{}", FMT_VERSION / 10000, FMT_VERSION / 100 % 100, FMT_VERSION % 100)},
-          {"nlohmann_json", fmt::format("{}.{}.{}", NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR,
-                                        NLOHMANN_JSON_VERSION_PATCH)},
+          {"nlohmann_json",
+           fmt::format("{}.{}.{}", NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR, NLOHMANN_JSON_VERSION_PATCH)},
           {"cli11", CLI11_VERSION}};
 }
 

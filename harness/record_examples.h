@@ -10,12 +10,13 @@ namespace nullmark {
 
 /// Two estimators in a grey and in a chromatic medium, and a table, for tests of what is done with results.
 inline Plan example_plan() {
-  return read_config(R"({"$schema":"nullmark/config/1","name":"example","experiments":[{"name":"e","rays":"single","samples_per_ray":10,
+  return read_config(
+      R"({"$schema":"nullmark/config/1","name":"example","experiments":[{"name":"e","rays":"single","samples_per_ray":10,
     "matrix":{"estimator":["ratio",{"type":"residual_ratio","control":"average"}],
               "medium":["linear",{"type":"layers","values":[1,2,3],"lo":[-1,0,0],"spectrum":[1,2,4]}]}}],
     "tables":[{"title":"T","rows":[{"label":"R","given":{"paper":0.1},"note":"not reproduced",
                "cells":{"here":{"estimator":"ratio","medium":"linear"}},"theory":{"estimator":"ratio","medium":"linear"}}]}]})",
-                     "example.json");
+      "example.json");
 }
 
 /// Results with numbers that only a round trip bit for bit brings back.
@@ -50,11 +51,11 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
     record.null_collisions_per_sample = 1.7976931348623157e308;
     record.draws_per_sample = next();
     record.lookups = 9007199254740993;
-    record.draws = 18446744073709551615u;
+    record.draws = 9223372036854775807;
     record.majorant_violations = 3;
     record.largest_violation = 1 + 2.220446049250313e-16;
     record.time = TimeRecord{next(), next(), next(), next(), next(), 2, 1, 64, {next(), next()}};
-    for (std::uint64_t samples : {1, 2}) {
+    for (const std::uint64_t samples : {std::uint64_t{1}, std::uint64_t{2}}) {
       ConvergenceRecord step{samples, {}, {}};
       for (int c = 0; c < record.channels; ++c) {
         step.rmse.push_back(next());

@@ -93,9 +93,7 @@ std::optional<Real> optional_real(const Place& object, const char* key) {
 
 Real real_or_nan(const Place& object, const char* key) { return optional_real(object, key).value_or(kNotANumber); }
 
-std::uint64_t count(const Place& object, const char* key) {
-  return object.has(key) ? object[key].unsigned_integer(0, kAny) : 0;
-}
+std::uint64_t count(const Place& object, const char* key) { return object.has(key) ? object[key].unsigned_integer(0, kAny) : 0; }
 
 std::string string_or_empty(const Place& object, const char* key) {
   return object.has(key) && !object[key].json().is_null() ? object[key].string() : "";
@@ -182,7 +180,8 @@ TimeRecord read_time(const Place& place) {
   time.threads = static_cast<int>(place["threads"].integer(0, std::numeric_limits<int>::max()));
   time.samples_per_traversal = count(place, "samples_per_traversal");
   if (place.has("repetition_ns"))
-    for (const Place& ns : place["repetition_ns"].elements()) time.repetition_ns.push_back(optional_real(ns).value_or(kNotANumber));
+    for (const Place& ns : place["repetition_ns"].elements())
+      time.repetition_ns.push_back(optional_real(ns).value_or(kNotANumber));
   return time;
 }
 
@@ -252,10 +251,8 @@ Json cell_json(const CellRecord& record) {
                {"rays", record.rays},
                {"samples_per_ray", cell.samples_per_ray}};
   if (cell.equal_lookups) json["equal_lookups"] = *cell.equal_lookups;
-  json.update(Json{{"samples", record.samples},
-                   {"seed", cell.seed},
-                   {"own_streams", cell.own_streams},
-                   {"status", to_string(record.status)}});
+  json.update(Json{
+      {"samples", record.samples}, {"seed", cell.seed}, {"own_streams", cell.own_streams}, {"status", to_string(record.status)}});
   if (!record.reason.empty()) json["reason"] = record.reason;
   json.update(Json{
       {"mean", field(record, &ChannelRecord::mean)},
@@ -348,9 +345,9 @@ CellRecord read_cell(const Place& place) {
 std::string results_text(const RunRecord& run) {
   Json provenance = Json::object();
   for (const auto& [key, text] : run.provenance) provenance[key] = Json::parse(text);
-  std::string text = fmt::format("{{\n\"nullmark_schema\": {},\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": {},\n",
-                                 RunRecord::kSchema, Json(run.name).dump(), config_hash(run.config_text),
-                                 run.config_text.empty() ? "null" : run.config_text);
+  std::string text =
+      fmt::format("{{\n\"nullmark_schema\": {},\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": {},\n", RunRecord::kSchema,
+                  Json(run.name).dump(), config_hash(run.config_text), run.config_text.empty() ? "null" : run.config_text);
   text += fmt::format("\"provenance\": {},\n\"cells\": [", provenance.dump());
   for (std::size_t i = 0; i < run.cells.size(); ++i) {
     text += i == 0 ? "\n" : ",\n";
@@ -365,7 +362,8 @@ RunRecord read_results(const std::string& text, const std::string& file) {
   const Place top(json, file);
   top.expect_object();
   if (!top.has("nullmark_schema")) top.fail("\"nullmark_schema\" is missing; expected a results file of nullmark");
-  if (const Place schema = top["nullmark_schema"]; !json["nullmark_schema"].is_number_integer() || json["nullmark_schema"] != RunRecord::kSchema)
+  if (const Place schema = top["nullmark_schema"];
+      !json["nullmark_schema"].is_number_integer() || json["nullmark_schema"] != RunRecord::kSchema)
     schema.expected(fmt::format("{}, the schema this program reads", RunRecord::kSchema));
   RunRecord run;
   run.name = top["name"].string();

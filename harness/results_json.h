@@ -20,8 +20,8 @@ std::string results_text(const RunRecord& run);
 /// Reads files of the same major schema number; keys it does not know are ignored.  Throws InputError.
 RunRecord read_results(const std::string& text, const std::string& file);
 
-/// Everything that the seed decides, one cell a line: no time, no provenance, no file names.  Equal texts mean equal statistics to
-/// the last bit.
+/// Everything that the seed decides, one cell a line: no time, no provenance, no file names.  Equal texts mean equal statistics
+/// to the last bit.
 std::string statistics_text(const RunRecord& run);
 
 const char* to_string(Status status);

@@ -43,8 +43,8 @@ TEST(ResultsJson, EveryFieldComesBackBitForBit) {
     ASSERT_EQ(a.channel.size(), b.channel.size());
     for (std::size_t c = 0; c < a.channel.size(); ++c) {
       const auto fields = [](const ChannelRecord& r) {
-        return std::vector{r.mean, r.reference, r.reference_error, r.bias, r.rmse, r.rmse_theory, r.variance, r.variance_theory,
-                           r.relative_variance, r.kurtosis};
+        return std::vector{r.mean,     r.reference,       r.reference_error,   r.bias,    r.rmse, r.rmse_theory,
+                           r.variance, r.variance_theory, r.relative_variance, r.kurtosis};
       };
       EXPECT_EQ(fields(a.channel[c]), fields(b.channel[c]));
     }
@@ -147,7 +147,8 @@ TEST(Table, ShowsGroupsTheoryForHeavyTailsAndTheSourceBeside) {
   EXPECT_NE(text.find("e: linear, global, transmittance, single, 10 samples per ray, seed 1\n"), std::string::npos) << text;
   EXPECT_NE(text.find("0.25*"), std::string::npos) << text;
   EXPECT_NE(text.find("  channel 2"), std::string::npos);
-  EXPECT_NE(text.find("T (rmse)\n   paper   here  theory  note\nR    0.1  0.125    0.25  not reproduced\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("T (rmse)\n   paper   here  theory  note\nR    0.1  0.125    0.25  not reproduced\n"), std::string::npos)
+      << text;
 }
 
 }  // namespace

@@ -175,7 +175,8 @@ Json cell_schema() {
        {"seed", whole(0)},
        {"own_streams", {{"type", "boolean"}}},
        {"measurement", {{"type", "object"}, {"required", {"clamp", "quantise_bits"}}}},
-       {"status", {{"enum", {to_string(Status::ok), to_string(Status::skipped), to_string(Status::not_run), to_string(Status::error)}}}},
+       {"status",
+        {{"enum", {to_string(Status::ok), to_string(Status::skipped), to_string(Status::not_run), to_string(Status::error)}}}},
        {"reason", text},
        {"mean", statistic("average over the rays")},
        {"reference", object_schema({{"value", statistic("average over the rays")},
@@ -207,9 +208,10 @@ Json cell_schema() {
                                              {"samples", "rmse", "variance"}))},
        {"image_maximum", nullable("number")},
        {"images", {{"type", "object"}, {"additionalProperties", text}}}},
-      {"id", "name", "experiment", "estimator", "medium", "majorant", "ray_set", "quantity", "channels", "effects", "rays",
-       "samples_per_ray", "samples", "seed", "own_streams", "measurement", "status", "mean", "reference", "bias", "rmse", "variance",
-       "time", "efficiency"});
+      {"id",        "name",     "experiment",  "estimator",   "medium", "majorant",
+       "ray_set",   "quantity", "channels",    "effects",     "rays",   "samples_per_ray",
+       "samples",   "seed",     "own_streams", "measurement", "status", "mean",
+       "reference", "bias",     "rmse",        "variance",    "time",   "efficiency"});
 }
 
 }  // namespace
@@ -217,10 +219,18 @@ Json cell_schema() {
 Json parameter_schema(const ParameterInfo& parameter) {
   Json json;
   switch (parameter.default_value.index()) {
-    case 0: json = range_schema(parameter.range); break;
-    case 1: json = {{"type", "integer"}, {"minimum", parameter.low}, {"maximum", parameter.high}}; break;
-    case 2: json = {{"type", "boolean"}}; break;
-    case 3: json = {{"type", "string"}}; break;
+    case 0:
+      json = range_schema(parameter.range);
+      break;
+    case 1:
+      json = {{"type", "integer"}, {"minimum", parameter.low}, {"maximum", parameter.high}};
+      break;
+    case 2:
+      json = {{"type", "boolean"}};
+      break;
+    case 3:
+      json = {{"type", "string"}};
+      break;
     case 4:
       json = list_of(range_schema(parameter.range), parameter.least);
       json["maxItems"] = parameter.most;
@@ -231,7 +241,8 @@ Json parameter_schema(const ParameterInfo& parameter) {
   }
   if (!parameter.allowed.empty()) json["enum"] = parameter.allowed;
   std::visit([&](const auto& value) { json["default"] = value; }, parameter.default_value);
-  return described(std::move(json), parameter.unit.empty() ? parameter.text : fmt::format("{} [{}]", parameter.text, parameter.unit));
+  return described(std::move(json),
+                   parameter.unit.empty() ? parameter.text : fmt::format("{} [{}]", parameter.text, parameter.unit));
 }
 
 Json config_schema() {
@@ -241,10 +252,11 @@ Json config_schema() {
        {"name", {{"type", "string"}}},
        {"seed", {{"type", "integer"}, {"minimum", 0}, {"default", 1}}},
        {"timing",
-        closed_object({{"enabled", {{"type", "boolean"}, {"default", TimingPlan{}.enabled}}},
-                       {"repetitions", {{"type", "integer"}, {"minimum", 1}, {"maximum", 10'000}, {"default", TimingPlan{}.repetitions}}},
-                       {"seconds", described(positive(), "least time of one repetition")},
-                       {"samples_per_traversal", described(whole(1), "samples that share one walk through the majorant structure")}})},
+        closed_object(
+            {{"enabled", {{"type", "boolean"}, {"default", TimingPlan{}.enabled}}},
+             {"repetitions", {{"type", "integer"}, {"minimum", 1}, {"maximum", 10'000}, {"default", TimingPlan{}.repetitions}}},
+             {"seconds", described(positive(), "least time of one repetition")},
+             {"samples_per_traversal", described(whole(1), "samples that share one walk through the majorant structure")}})},
        {"experiments", list_of(reference("experiment"), 1)},
        {"tables", list_of(reference("table"))}},
       {"$schema", "experiments"}));

@@ -45,7 +45,9 @@ class Checker {
 TEST(Schema, AcceptsTheConfigurationsOfTheTree) {
   const Checker check(config_schema());
   for (const auto& entry : std::filesystem::directory_iterator(NULLMARK_SOURCE_DIR "/configs"))
-    if (entry.path().extension() == ".json") EXPECT_EQ(check(read_file(entry.path().string())), "") << entry.path();
+    if (entry.path().extension() == ".json") {
+      EXPECT_EQ(check(read_file(entry.path().string())), "") << entry.path();
+    }
   EXPECT_EQ(check(example_plan().config_text), "");
 }
 

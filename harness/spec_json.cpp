@@ -35,8 +35,7 @@ Json deciding_json(const Plan& plan, const Cell& cell) {
 
 Json parameters_json(const ParameterValues& values) {
   Json json = Json::object();
-  for (const auto& [name, value] : values)
-    std::visit([&, &key = name](const auto& held) { json[key] = held; }, value);
+  for (const auto& [name, value] : values) std::visit([&, &key = name](const auto& held) { json[key] = held; }, value);
   return json;
 }
 

@@ -139,7 +139,8 @@ std::string aligned(const std::vector<std::vector<std::string>>& lines, std::siz
     std::string row;
     for (std::size_t i = 0; i < line.size(); ++i) {
       if (i > 0) row += "  ";
-      row += i < left || i + 1 == line.size() ? fmt::format("{:<{}}", line[i], width[i]) : fmt::format("{:>{}}", line[i], width[i]);
+      row +=
+          i < left || i + 1 == line.size() ? fmt::format("{:<{}}", line[i], width[i]) : fmt::format("{:>{}}", line[i], width[i]);
     }
     row.erase(row.find_last_not_of(' ') + 1);
     text += row + "\n";
@@ -151,15 +152,16 @@ std::string results_tables(const RunRecord& run) {
   std::string text;
   bool marked = false;
   for (const auto& [title, records] : grouped(run.cells, heading)) {
-    std::vector<Line> lines = {{"estimator", "rmse", "bias", "variance", "variance theory", "lookups", "lookups theory", "ns/lookup",
-                                "floor ratio", "variance x ns", "status"}};
+    std::vector<Line> lines = {{"estimator", "rmse", "bias", "variance", "variance theory", "lookups", "lookups theory",
+                                "ns/lookup", "floor ratio", "variance x ns", "status"}};
     for (const CellRecord* record : records) {
       append_lines(*record, lines);
       for (const ChannelRecord& channel : record->channel) marked |= heavy_tailed(channel) && channel.variance_theory;
     }
     text += title + "\n" + aligned(lines, 1) + "\n";
   }
-  if (marked) text += fmt::format("* theory: the relative variance is above {}, too heavy a tail for the sample's own\n\n", kHeavyTail);
+  if (marked)
+    text += fmt::format("* theory: the relative variance is above {}, too heavy a tail for the sample's own\n\n", kHeavyTail);
   std::map<std::string, const CellRecord*> cells;
   for (const CellRecord& record : run.cells) cells[record.cell.name] = &record;
   for (const Table& table : run.tables) text += side_by_side(table, cells) + "\n";

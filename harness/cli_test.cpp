@@ -1,0 +1,171 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "harness/exit_code.h"
+#include "harness/file_io.h"
+#include "harness/journal.h"
+#include "harness/results_json.h"
+
+namespace nullmark {
+namespace {
+
+/// The program itself, in a folder of its own.
+class Cli : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(::testing::TempDir()) /
+              (std::string("nullmark_cli_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    write("c.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
+      {"name":"e","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":50,
+       "matrix":{"estimator":["ratio","delta","residual_ratio"],"medium":["linear",{"type":"linear","end":2}]}}]})");
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
+  std::string read(const std::string& name) const { return read_file((folder_ / name).string()); }
+  RunRecord results(const std::string& name) const { return read_results(read(name), name); }
+
+  /// Exit code; output goes to the files "out" and "err".
+  int run(const std::string& arguments, const std::string& input = "/dev/null") const {
+    const std::string command = "cd '" + folder_.string() + "' && '" NULLMARK_PROGRAM "' " + arguments + " >out 2>err <" + input;
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+
+  static int code(ExitCode exit) { return static_cast<int>(exit); }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(Cli, RunWritesResultsAndRefusesToReplaceThem) {
+  EXPECT_EQ(run("run c.json"), 0) << read("err");
+  EXPECT_EQ(results("c.results.json").cells.size(), 6u);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "c.results.json.journal"));
+  EXPECT_NE(read("out").find("e: linear/end:2, global, transmittance"), std::string::npos);
+  EXPECT_EQ(run("run c.json"), code(ExitCode::input_error));
+  EXPECT_EQ(read("err"), "nullmark: c.results.json: exists; --resume completes it, --force replaces it\n");
+  EXPECT_EQ(run("run c.json --force"), 0);
+}
+
+TEST_F(Cli, StandardOutputCarriesOnlyTheResults) {
+  EXPECT_EQ(run("run - -o -", "c.json"), 0) << read("err");
+  EXPECT_EQ(read_results(read("out"), "out").cells.size(), 6u);
+}
+
+TEST_F(Cli, StatisticsDoNotDependOnThreadsShardsOrResume) {
+  ASSERT_EQ(run("run c.json -o whole.json --threads 1"), 0);
+  const std::string expected = statistics_text(results("whole.json"));
+  ASSERT_EQ(run("run c.json -o threads.json --threads 3"), 0);
+  EXPECT_EQ(statistics_text(results("threads.json")), expected);
+  ASSERT_EQ(run("run c.json -o a.json --shard 1/2"), 0);
+  ASSERT_EQ(run("run c.json -o b.json --shard 2/2"), 0);
+  EXPECT_EQ(results("a.json").cells.size(), 3u);
+  ASSERT_EQ(run("merge b.json a.json -o merged.json"), 0) << read("err");
+  EXPECT_EQ(statistics_text(results("merged.json")), expected);
+  ASSERT_EQ(run("run c.json -o parts.json --filter ^ratio"), 0);
+  EXPECT_EQ(results("parts.json").cells.size(), 2u);
+  ASSERT_EQ(run("run c.json -o parts.json --resume"), 0) << read("err");
+  EXPECT_NE(read("err").find("[4/4]"), std::string::npos) << read("err");
+  EXPECT_EQ(statistics_text(results("parts.json")), expected);
+}
+
+TEST_F(Cli, ResumesFromTheJournalOfAKilledRun) {
+  ASSERT_EQ(run("run c.json -o whole.json"), 0);
+  const RunRecord whole = results("whole.json");
+  {
+    Journal journal((folder_ / "r.json").string(), Json::parse(read("whole.json"))["config_hash"], Journal::Mode::fresh);
+    journal.append(whole.cells[4]);
+    EXPECT_EQ(run("run c.json -o r.json --force"), code(ExitCode::input_error)) << "the journal is locked";
+  }
+  EXPECT_EQ(run("run c.json -o r.json"), code(ExitCode::input_error));
+  EXPECT_EQ(run("run c.json -o r.json --resume --seed 2"), code(ExitCode::input_error));
+  EXPECT_EQ(run("run c.json -o r.json --resume"), 0) << read("err");
+  EXPECT_NE(read("err").find("[5/5]"), std::string::npos) << read("err");
+  EXPECT_EQ(statistics_text(results("r.json")), statistics_text(whole));
+}
+
+TEST_F(Cli, SeedsChangeStatisticsAndAreRecorded) {
+  ASSERT_EQ(run("run c.json -o a.json --seed 7"), 0);
+  EXPECT_EQ(results("a.json").cells[0].cell.seed, 7u);
+  ASSERT_EQ(run("run c.json -o b.json --seed random"), 0);
+  EXPECT_NE(statistics_text(results("a.json")), statistics_text(results("b.json")));
+}
+
+TEST_F(Cli, InterruptKeepsWhatIsDone) {
+  write("long.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
+      {"name":"e","rays":{"type":"orthographic"},"samples_per_ray":[1],"matrix":{"estimator":"ratio","medium":["linear"]}},
+      {"name":"f","rays":{"type":"orthographic","width":1024,"height":1024},"samples_per_ray":20000,"matrix":{"estimator":"ratio","medium":["linear"]}}]})");
+  const std::string command =
+      "cd '" + folder_.string() + "' && { timeout --preserve-status -s INT 2 '" NULLMARK_PROGRAM "' run long.json >out 2>err; }";
+  const int status = std::system(command.c_str());
+  EXPECT_EQ(WEXITSTATUS(status), code(ExitCode::interrupted));
+  const RunRecord partial = results("long.results.json");
+  ASSERT_EQ(partial.cells.size(), 2u);
+  EXPECT_EQ(partial.cells[0].status, Status::ok);
+  EXPECT_EQ(partial.cells[1].status, Status::not_run);
+}
+
+TEST_F(Cli, ErrorsAreOneLineWithTheRightCode) {
+  write(
+      "bad.json",
+      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratoi","medium":"linear"}}]})");
+  write(
+      "clash.json",
+      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"linear","hi":[0,1,1]}}}]})");
+  write(
+      "missing.json",
+      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"nowhere.vdb"}}}]})");
+  write(
+      "optional.json",
+      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"nowhere.vdb","optional":true}}}]})");
+  const std::vector<std::pair<std::string, ExitCode>> cases = {{"rnu", ExitCode::input_error},
+                                                               {"run", ExitCode::input_error},
+                                                               {"run nowhere.json", ExitCode::input_error},
+                                                               {"run c.json --shard 3/2", ExitCode::input_error},
+                                                               {"run c.json --filter '('", ExitCode::input_error},
+                                                               {"run c.json --seed -1", ExitCode::input_error},
+                                                               {"run c.json --filter nothing", ExitCode::nothing_ran},
+                                                               {"run bad.json", ExitCode::input_error},
+                                                               {"run clash.json", ExitCode::input_error},
+                                                               {"run missing.json", ExitCode::input_error},
+                                                               {"compare c.json", ExitCode::input_error},
+                                                               {"list estimator", ExitCode::input_error}};
+  for (const auto& [arguments, exit] : cases) {
+    EXPECT_EQ(run(arguments), code(exit)) << arguments;
+    const std::string error = read("err");
+    EXPECT_EQ(error.rfind("nullmark: ", 0), 0u) << arguments << ": " << error;
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << arguments << ": " << error;
+    EXPECT_EQ(read("out"), "") << arguments;
+  }
+  run("run clash.json");
+  EXPECT_EQ(read("err").rfind("nullmark: clash.json: /experiments/0/matrix/medium/hi: ", 0), 0u) << read("err");
+  EXPECT_EQ(run("run optional.json"), code(ExitCode::nothing_ran));
+  EXPECT_EQ(results("optional.results.json").cells.at(0).status, Status::skipped);
+}
+
+TEST_F(Cli, ListsSchemasAndVersion) {
+  for (const char* what : {"estimators", "media", "majorants", "rays", "quantities"}) {
+    EXPECT_EQ(run(std::string("list ") + what), 0);
+    EXPECT_EQ(run(std::string("list --json ") + what), 0);
+    EXPECT_FALSE(Json::parse(read("out")).empty()) << what;
+  }
+  for (const char* which : {"config", "results"}) {
+    EXPECT_EQ(run(std::string("schema ") + which), 0);
+    EXPECT_EQ(Json::parse(read("out"))["$schema"], "http://json-schema.org/draft-07/schema#");
+  }
+  EXPECT_EQ(run("--version"), 0);
+  EXPECT_EQ(read("out").rfind("nullmark ", 0), 0u);
+  EXPECT_EQ(run("run --help"), 0);
+  EXPECT_EQ(run("run c.json --dry-run"), 0);
+  EXPECT_NE(read("out").find("6 cells"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "c.results.json"));
+}
+
+}  // namespace
+}  // namespace nullmark
