@@ -19,7 +19,7 @@ class Rates {
   /// Appends the piece from the current end to `end`.  Zero rates are fine, also over an infinite length.
   void append(Real end, Real rate) {
     const Real from = this->end(), before = total_depth();
-    pieces_.push_back({from, end, rate, before, rate > 0 ? before + rate * (end - from) : before});
+    pieces_.push_back({from, end, rate, 1 / rate, before, rate > 0 ? before + rate * (end - from) : before});
   }
 
   std::size_t size() const { return pieces_.size(); }
@@ -34,12 +34,12 @@ class Rates {
   /// Distance at which the depth, within piece i, is reached.
   Real position(std::size_t i, Real depth) const {
     const Piece& piece = pieces_[i];
-    return std::min(piece.end, piece.begin + (depth - piece.depth_before) / piece.rate);
+    return std::min(piece.end, piece.begin + (depth - piece.depth_before) * piece.inverse_rate);
   }
 
  private:
   struct Piece {
-    Real begin, end, rate, depth_before, depth_after;
+    Real begin, end, rate, inverse_rate, depth_before, depth_after;
   };
   std::vector<Piece> pieces_;
   Real begin_ = 0;

@@ -19,7 +19,7 @@ struct PublishedNextFlightRatioTracking : NextFlightRatioTracking<Value> {
 
   bool propose(Walk&, const Passage<Value>& ray, Flight& flight, auto& rng) const {
     if (!(ray.length() > 0)) return false;
-    const Real step = -std::log1p(-rng.uniform() / flight.rate());
+    const Real step = -std::log(1 - rng.uniform() / flight.rate());
     return flight.advance_to(flight.depth() + step * flight.rate());
   }
 

@@ -42,7 +42,7 @@ struct PublishedRatioTracking {
 
   bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto&) const {
     const float u = hash(ray.entry, static_cast<float>(walk.count++) + walk.frame_time);
-    return flight.advance_to(flight.depth() - std::log1p(-static_cast<Real>(u)));
+    return flight.advance_to(flight.depth() - std::log(1 - static_cast<Real>(u)));
   }
 
   void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto&) const {

@@ -38,7 +38,7 @@ struct AlongAxis {
   Real target_depth = 0;
 
   int axis = 0;
-  Real scale = 1;
+  Real scale = 1, inverse_extent = 1;
 
   void parameters(ParameterVisitor& visit) {
     profile.parameters(visit);
@@ -52,6 +52,7 @@ struct AlongAxis {
   void prepare() {
     if (Box{lo, hi}.empty()) throw ParameterError("hi", "box is empty: every component of hi must exceed that of lo");
     axis = axis_name[0] - 'x';
+    inverse_extent = 1 / (hi[axis] - lo[axis]);
     if constexpr (requires { profile.prepare(); }) profile.prepare();
     if (target_depth > 0) {
       const Real whole = profile.integral(0, 1) * (hi[axis] - lo[axis]);
@@ -64,9 +65,15 @@ struct AlongAxis {
 
   Box bounds() const { return {lo, hi}; }
 
-  Real coordinate(Real x) const { return std::min<Real>(1, std::max<Real>(0, (x - lo[axis]) / (hi[axis] - lo[axis]))); }
+  Real coordinate(Real x) const { return std::min<Real>(1, std::max<Real>(0, (x - lo[axis]) * inverse_extent)); }
 
   Real extinction(const Vec3& p) const { return scale * profile.value(coordinate(p[axis])); }
+
+  /// The axis is chosen once for the block.
+  void extinction(const Points& points, Real* out) const {
+    const Real* x = axis == 0 ? points.x : axis == 1 ? points.y : points.z;
+    for (std::size_t i = 0; i < points.size; ++i) out[i] = scale * profile.value(coordinate(x[i]));
+  }
 
   Extrema extrema(const Box& box) const {
     const Real a = coordinate(box.lo[axis]), b = coordinate(box.hi[axis]);

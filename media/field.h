@@ -37,7 +37,10 @@ class FieldMedium final : public Medium {
   Box bounds() const override { return field_.bounds(); }
 
   void extinction(const Points& points, Real* out) const override {
-    for (std::size_t i = 0; i < points.size; ++i) out[i] = field_.extinction(points[i]);
+    if constexpr (requires { field_.extinction(points, out); })
+      field_.extinction(points, out);
+    else
+      for (std::size_t i = 0; i < points.size; ++i) out[i] = field_.extinction(points[i]);
   }
 
   Extrema extrema(const Box& box) const override {
