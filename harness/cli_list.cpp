@@ -74,10 +74,10 @@ void print_text(const Json& list) {
     }
     if (!entry.contains("parameters")) continue;
     for (const Json& parameter : entry["parameters"]) {
-      const std::string unit = parameter.contains("unit") ? " " + plain(parameter["unit"]) : "";
+      const std::string unit = parameter.contains("unit") ? fmt::format(" {}", plain(parameter["unit"])) : "";
       const std::string range = range_text(parameter);
       fmt::print("    {} = {}{}{}: {}\n", plain(parameter["name"]), parameter["default"].dump(), unit,
-                 range.empty() ? "" : " (" + range + ")", plain(parameter["description"]));
+                 range.empty() ? "" : fmt::format(" ({})", range), plain(parameter["description"]));
     }
   }
 }

@@ -100,9 +100,9 @@ TEST_F(Cli, SeedsChangeStatisticsAndAreRecorded) {
 TEST_F(Cli, InterruptKeepsWhatIsDone) {
   write("long.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
       {"name":"e","rays":{"type":"orthographic"},"samples_per_ray":[1],"matrix":{"estimator":"ratio","medium":["linear"]}},
-      {"name":"f","rays":{"type":"orthographic","width":1024,"height":1024},"samples_per_ray":20000,"matrix":{"estimator":"ratio","medium":["linear"]}}]})");
+      {"name":"f","rays":{"type":"orthographic","width":64,"height":64},"samples_per_ray":2000000,"matrix":{"estimator":"ratio","medium":["linear"]}}]})");
   const std::string command =
-      "cd '" + folder_.string() + "' && { timeout --preserve-status -s INT 2 '" NULLMARK_PROGRAM "' run long.json >out 2>err; }";
+      "cd '" + folder_.string() + "' && { timeout --preserve-status -s INT 3 '" NULLMARK_PROGRAM "' run long.json >out 2>err; }";
   const int status = std::system(command.c_str());
   EXPECT_EQ(WEXITSTATUS(status), code(ExitCode::interrupted));
   const RunRecord partial = results("long.results.json");

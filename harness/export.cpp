@@ -124,7 +124,7 @@ std::string csv(const RunRecord& run) {
   std::string text;
   const auto add_line = [&](const Row& row, bool heading) {
     for (std::size_t i = 0; i < row.size(); ++i)
-      text += (i > 0 ? "," : "") + csv_field(heading ? std::string(row[i].first) : row[i].second);
+      text += fmt::format("{}{}", i > 0 ? "," : "", csv_field(heading ? std::string(row[i].first) : row[i].second));
     text += "\r\n";
   };
   add_line(csv_row(CellRecord{}, 0), true);

@@ -8,9 +8,20 @@
 namespace nullmark {
 namespace {
 
-/// Samples of one ray that make a chunk; a power of two, so that a chunk is a complete group of the convergence data.
-constexpr int kChunkLevel = 14;
-constexpr std::uint64_t kChunk = std::uint64_t{1} << kChunkLevel;
+/// Samples that a kernel is asked for at once.
+constexpr int kBatchLevel = 14;
+constexpr std::uint64_t kBatch = std::uint64_t{1} << kBatchLevel;
+
+/// Chunks of a cell, at most about: their results are kept until they are merged.
+constexpr std::uint64_t kMostChunks = std::uint64_t{1} << 18;
+
+/// log2 of the samples of one ray that make a chunk.  A power of two, so that a chunk is a complete group of the convergence data; decided
+/// by the plan alone, never by the threads.
+int chunk_level(std::size_t rays, std::uint64_t samples) {
+  int level = kBatchLevel;
+  while (level < 62 && (samples >> level) * rays > kMostChunks && (samples >> level) > 0) ++level;
+  return level;
+}
 
 /// Rays [first_ray, end_ray) with all their samples, or one ray with samples [first, first + count).
 struct Chunk {
@@ -27,14 +38,14 @@ struct ChunkResult {
   std::uint64_t nonfinite = 0;
 };
 
-std::vector<Chunk> cut(std::size_t rays, std::uint64_t samples) {
+std::vector<Chunk> cut(std::size_t rays, std::uint64_t samples, std::uint64_t chunk) {
   std::vector<Chunk> chunks;
-  if (samples > kChunk) {
+  if (samples > chunk) {
     for (std::size_t r = 0; r < rays; ++r)
-      for (std::uint64_t first = 0; first < samples; first += kChunk)
-        chunks.push_back({r, r + 1, first, std::min(kChunk, samples - first)});
+      for (std::uint64_t first = 0; first < samples; first += chunk)
+        chunks.push_back({r, r + 1, first, std::min(chunk, samples - first)});
   } else {
-    const std::size_t together = std::max<std::size_t>(1, kChunk / samples);
+    const std::size_t together = std::max<std::size_t>(1, kBatch / samples);
     for (std::size_t r = 0; r < rays; r += together) chunks.push_back({r, std::min(rays, r + together), 0, samples});
   }
   return chunks;
@@ -63,7 +74,9 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   const std::size_t rays = scene.rays->local.size();
   const auto channels = static_cast<std::size_t>(scene.reference->channels);
   const std::uint64_t key = stream_key(cell, *scene.medium);
-  const std::vector<Chunk> chunks = cut(rays, cell.samples_per_ray);
+  const int level = chunk_level(rays, cell.samples_per_ray);
+  const std::uint64_t whole_chunk = std::uint64_t{1} << level;
+  const std::vector<Chunk> chunks = cut(rays, cell.samples_per_ray, whole_chunk);
 
   Sampled result;
   result.moments.resize(rays * channels);
@@ -94,24 +107,30 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
       for (std::size_t c = 0; c < channels && chunk.first == 0; ++c)
         result.reference[ray * channels + c] = measured(expected[static_cast<Eigen::Index>(c)], cell.measurement);
       const std::uint64_t lookups_before = out.counters.lookups;
-      kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, chunk.first, chunk.count, cell.quantity,
-                    mine.block, out.counters);
       const std::size_t local = ray - chunk.first_ray;
+      for (std::uint64_t drawn = 0; drawn < chunk.count && !stopped; drawn += kBatch) {
+        if (drawn > 0 && stop()) stopped = true;
+        const std::uint64_t batch = std::min(kBatch, chunk.count - drawn);
+        kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, chunk.first + drawn, batch, cell.quantity,
+                      mine.block, out.counters);
+        for (std::size_t c = 0; c < channels; ++c) {
+          Moments& moments = out.moments[local * channels + c];
+          const Real reference = measured(expected[static_cast<Eigen::Index>(c)], cell.measurement);
+          for (std::size_t i = 0; i < batch; ++i) {
+            const Real value = mine.block.values[i * channels + c];
+            if (!std::isfinite(value)) {
+              ++out.nonfinite;
+              continue;
+            }
+            const Real error = measured(value, cell.measurement) - reference;
+            moments.add(error);
+            out.groups[c].add(error);
+          }
+        }
+      }
       out.lookups[local] = out.counters.lookups - lookups_before;
       for (std::size_t c = 0; c < channels; ++c) {
-        Moments& moments = out.moments[local * channels + c];
-        const Real reference = measured(expected[static_cast<Eigen::Index>(c)], cell.measurement);
-        for (std::size_t i = 0; i < chunk.count; ++i) {
-          const Real value = mine.block.values[i * channels + c];
-          if (!std::isfinite(value)) {
-            ++out.nonfinite;
-            continue;
-          }
-          const Real error = measured(value, cell.measurement) - reference;
-          moments.add(error);
-          out.groups[c].add(error);
-        }
-        out.group_sums[c] = moments.s1;
+        out.group_sums[c] = out.moments[local * channels + c].s1;
         out.groups[c].finish_ray();
       }
     }
@@ -130,16 +149,16 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     }
     for (std::size_t c = 0; c < channels; ++c) {
       result.groups[c] += part.groups[c];
-      if (cell.samples_per_ray <= kChunk) continue;
+      if (cell.samples_per_ray <= whole_chunk) continue;
       if (chunk.first == 0) across[c].finish_ray();
-      if (chunk.count == kChunk) across[c].carry(kChunkLevel, part.group_sums[c]);
+      if (chunk.count == whole_chunk) across[c].carry(static_cast<std::size_t>(level), part.group_sums[c]);
     }
     result.counters += part.counters;
     result.nonfinite += part.nonfinite;
   }
-  if (cell.samples_per_ray > kChunk) {
+  if (cell.samples_per_ray > whole_chunk) {
     // A chunk's own groups already hold the level at which the chunks begin.
-    for (std::size_t c = 0; c < channels; ++c) result.groups[c].append_above(kChunkLevel, across[c]);
+    for (std::size_t c = 0; c < channels; ++c) result.groups[c].append_above(static_cast<std::size_t>(level), across[c]);
   }
   return result;
 }
