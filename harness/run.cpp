@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <thread>
 
@@ -272,14 +273,11 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
   }
 }
 
-std::vector<PreparedCell> prepare_all(const Plan& plan, const std::vector<bool>& selected,
-                                      const std::vector<CellRecord>& finished) {
-  Workshop workshop(plan);
+/// Prepares the cells that `wanted` picks, by their place in the plan.
+std::vector<PreparedCell> prepare_all(Workshop& workshop, const Plan& plan, const std::function<bool(std::size_t)>& wanted) {
   std::vector<PreparedCell> cells;
-  for (std::size_t i = 0; i < plan.cells.size(); ++i) {
-    const auto same = [&](const CellRecord& record) { return record.cell.id == plan.cells[i].id; };
-    if (selected[i] && std::none_of(finished.begin(), finished.end(), same)) cells.push_back(workshop.prepare(plan.cells[i], i));
-  }
+  for (std::size_t i = 0; i < plan.cells.size(); ++i)
+    if (wanted(i)) cells.push_back(workshop.prepare(plan.cells[i], i));
   return cells;
 }
 
@@ -292,15 +290,23 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
   const auto start = std::chrono::steady_clock::now();
   const auto stop = [&] { return options.interrupted && options.interrupted->load() != 0; };
 
-  std::vector<PreparedCell> cells = prepare_all(plan, selected, finished);
-  if (!stop()) add_theory(cells);
-
   std::map<std::size_t, CellRecord> records;  // by place in the plan
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
     for (const CellRecord& record : finished)
       if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = record;
 
+  const bool timing = options.timing && plan.timing.enabled;
+  Workshop workshop(plan);
+  std::vector<PreparedCell> cells = prepare_all(workshop, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
+  // Statistics of a resumed run stand; a run that was stopped before or while timing still owes the times.
+  const std::vector<PreparedCell> untimed = prepare_all(workshop, plan, [&](std::size_t i) {
+    const auto record = records.find(i);
+    return timing && record != records.end() && record->second.status == Status::ok && !record->second.time;
+  });
+  if (!stop()) add_theory(cells);
+
   std::vector<const PreparedCell*> to_time;
+  for (const PreparedCell& prepared : untimed) to_time.push_back(&prepared);
   std::size_t done = 0;
   for (PreparedCell& prepared : cells) {
     CellRecord record = blank_record(plan, prepared);
@@ -329,7 +335,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     observer.cell_done(record, ++done, cells.size());
   }
 
-  if (options.timing && plan.timing.enabled && !to_time.empty() && !stop()) {
+  if (timing && !to_time.empty() && !stop()) {
     std::vector<TimedCell> timed;
     for (const PreparedCell* prepared : to_time) timed.push_back({prepared->cell, prepared->scene.get(), prepared->kernel.get()});
     const auto times = time_cells(timed, plan.timing, stop, [&](double fraction) { observer.timing(fraction); });
@@ -345,7 +351,8 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
 }
 
 std::vector<Prediction> predict(const Plan& plan, const std::vector<bool>& selected) {
-  std::vector<PreparedCell> cells = prepare_all(plan, selected, {});
+  Workshop workshop(plan);
+  std::vector<PreparedCell> cells = prepare_all(workshop, plan, [&](std::size_t i) { return selected[i]; });
   add_theory(cells);
   std::vector<Prediction> result;
   for (const PreparedCell& prepared : cells) {
