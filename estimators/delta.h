@@ -90,21 +90,26 @@ struct DeltaTracking {
     return dead;
   }
 
+  /// Where the majorant is violated every collision is accepted: the walk sees min(mu, mub).
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
-    const Real transmittance = std::exp(-profile.optical_depth(c));
-    Theory theory{.variance = transmittance * -std::expm1(-profile.optical_depth(c))};
+    const auto rate = [&](int k, const RayProfile::Node& at) {
+      return ray.per_channel.empty() ? ray.majorant.rate(at.piece) : ray.per_channel[static_cast<std::size_t>(k)].rate(at.piece);
+    };
+    const auto killed = [&](int k, const RayProfile::Node& at) { return std::min(at.extinction, rate(k, at)); };
+    const Real depth = profile.integrate(c, [&](const RayProfile::Node& at) { return killed(c, at); });
+    Theory theory{.variance = std::exp(-depth) * -std::expm1(-depth)};
+    if (depth < profile.optical_depth(c)) theory.mean = std::exp(-depth);
     if (ray.per_channel.empty()) {
-      theory.lookups = lookups_until_killed(
-          profile, [](int, const RayProfile::Node& at) { return at.extinction; },
-          [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); });
-    } else {
-      Real lookups = 0;
-      for (int k = 0; k < ray.channels; ++k)
-        lookups += profile.integrate(k, [&](const RayProfile::Node& at) {
-          return ray.per_channel[static_cast<std::size_t>(k)].rate(at.piece) * std::exp(-at.depth);
-        });
-      theory.lookups = lookups;
+      theory.lookups = lookups_until_killed(profile, killed, [&](const RayProfile::Node& at) { return rate(0, at); });
+      return theory;
     }
+    Real lookups = 0;
+    for (int k = 0; k < ray.channels; ++k) {
+      const auto dead = profile.running(k, [&](const RayProfile::Node& at) { return killed(k, at); });
+      std::size_t j = 0;
+      lookups += profile.integrate(k, [&](const RayProfile::Node& at) { return rate(k, at) * std::exp(-dead[j++]); });
+    }
+    theory.lookups = lookups;
     return theory;
   }
 };

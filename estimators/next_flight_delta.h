@@ -1,6 +1,6 @@
 #pragma once
 
-#include "estimators/next_flight.h"
+#include "estimators/estimator.h"
 #include "estimators/survival.h"
 
 namespace nullmark {
@@ -61,12 +61,42 @@ struct NextFlightDeltaTracking {
 
   int real_collisions(const Walk& walk, const Ray&) const { return walk.done; }
 
+  /// Renewal at collisions of rate mub: with q the chance to live on, c what a collision adds, K(y) = exp(-int_0^y mub (1 - q))
+  /// and I(y) = int_0^y mub c K, the sum beyond the first term has mean I(d) and second moment int mub (K c^2 + 2 c q (I(d) -
+  /// I(y))) dy; in variant B c is added only by those that live on.  Holds where the majorant is violated, too: q = max(0, 1 -
+  /// mu/mub), and the mean is then not T.
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
-    return {.variance = next_flight_variance(
-                ray.majorant, profile, c, [&](Real a) { return ray.weigh_all ? a * a : a; }, [](Real mu, Real) { return mu; }),
-            .lookups = lookups_until_killed(
-                profile, [](int, const RayProfile::Node& at) { return at.extinction; },
-                [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); })};
+    const auto rate = [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); };
+    const auto killed = [&](int, const RayProfile::Node& at) { return std::min(at.extinction, rate(at)); };
+    Theory theory{.lookups = lookups_until_killed(profile, killed, rate)};
+    if (!profile.resolved()) return theory;
+    const Real total = ray.majorant.total_depth();
+    const auto ahead = profile.running(c, rate);
+    const auto dead = profile.running(c, [&](const RayProfile::Node& at) { return killed(c, at); });
+    const std::vector<RayProfile::Node>& nodes = profile.nodes(c);
+    std::vector<Real> first(nodes.size());
+    bool violated = false;
+    for (std::size_t j = 0; j < nodes.size(); ++j) {
+      const Real mub = rate(nodes[j]), escape = std::exp(ahead[j] - total);
+      violated = violated || nodes[j].extinction > mub;
+      first[j] = (mub - (ray.weigh_all ? nodes[j].extinction : killed(c, nodes[j]))) * escape * std::exp(-dead[j]);
+    }
+    const auto sum = profile.running(first);
+    std::size_t j = 0;
+    const Real mean = profile.integrate(c, [&](const RayProfile::Node&) { return first[j++]; });
+    j = 0;
+    const Real second = profile.integrate(c, [&](const RayProfile::Node& at) {
+      const std::size_t i = j++;
+      const Real mub = rate(at);
+      if (!(mub > 0)) return Real{0};
+      const Real escape = std::exp(ahead[i] - total), live = (mub - killed(c, at)) / mub, rest = mean - sum[i];
+      if (!ray.weigh_all) return mub * live * (std::exp(-dead[i]) * escape * escape + 2 * escape * rest);
+      const Real adds = (mub - at.extinction) / mub * escape;
+      return mub * (std::exp(-dead[i]) * adds * adds + 2 * adds * live * rest);
+    });
+    theory.variance = std::max<Real>(0, second - mean * mean);
+    if (violated) theory.mean = std::exp(-total) + mean;
+    return theory;
   }
 };
 

@@ -72,16 +72,19 @@ struct ResidualDeltaTracking {
 
   int real_collisions(const Walk& walk, const Ray&) const { return walk.done; }
 
+  /// Where the rate is violated every collision is accepted: the walk sees min(mu - mu_c, mubr).
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
-    const Real transmittance = std::exp(-profile.optical_depth(c));
-    const Real residual = std::max<Real>(0, profile.optical_depth(c) - channel(ray.control.depth, c));
-    return {.variance = transmittance * std::exp(-channel(ray.control.depth, c)) * -std::expm1(-residual),
-            .lookups = lookups_until_killed(
-                profile,
-                [&](int k, const RayProfile::Node& at) {
-                  return std::max<Real>(0, at.extinction - channel(ray.control.at(at.t, at.piece), k));
-                },
-                [&](const RayProfile::Node& at) { return ray.residual.rate(at.piece); })};
+    const auto rate = [&](const RayProfile::Node& at) { return ray.residual.rate(at.piece); };
+    const auto killed = [&](int k, const RayProfile::Node& at) {
+      return std::clamp<Real>(at.extinction - channel(ray.control.at(at.t, at.piece), k), 0, rate(at));
+    };
+    const Real depth = profile.integrate(c, [&](const RayProfile::Node& at) { return killed(c, at); });
+    const Real control = channel(ray.control.depth, c);
+    Theory theory{.variance = std::exp(-2 * control - depth) * -std::expm1(-depth),
+                  .lookups = lookups_until_killed(profile, killed, rate)};
+    constexpr Real kRounding = 1e-12;
+    if (depth + control < profile.optical_depth(c) * (1 - kRounding)) theory.mean = std::exp(-control - depth);
+    return theory;
   }
 };
 

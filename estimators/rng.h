@@ -32,11 +32,24 @@ class Rng {
   /// Multiple of 2^-53 in [0, 1).
   Real uniform() {
     ++draws_;
+    ready_ = -1;
     return static_cast<Real>(next() >> 11) * 0x1p-53;
   }
 
   /// Unit exponential -log(1 - u); 1 - u is exact, so u = 0 gives 0 and u = 1 - 2^-53 gives 36.7.
-  Real exponential() { return -std::log(1 - uniform()); }
+  Real exponential() {
+    if (ready_ < 0) return -std::log(1 - uniform());
+    const Real e = ready_;
+    ready_ = -1;
+    ++draws_;
+    next();
+    return e;
+  }
+
+  /// 1 - u of the next draw, which is left undrawn; and its exponential, computed ahead for many streams at once.  It serves if
+  /// the next draw is an exponential and is forgotten if it is not.
+  Real peek() const { return 1 - static_cast<Real>(output() >> 11) * 0x1p-53; }
+  void make_ready(Real exponential) { ready_ = exponential; }
 
   std::uint64_t draws() const { return draws_; }
 
@@ -44,8 +57,10 @@ class Rng {
   std::uint64_t sample() const { return sample_; }
 
  private:
+  std::uint64_t output() const { return std::rotl(a_ + b_, 17) + a_; }
+
   std::uint64_t next() {
-    const std::uint64_t a = a_, result = std::rotl(a_ + b_, 17) + a_;
+    const std::uint64_t a = a_, result = output();
     const std::uint64_t b = b_ ^ a;
     a_ = std::rotl(a, 49) ^ b ^ (b << 21);
     b_ = std::rotl(b, 28);
@@ -53,6 +68,7 @@ class Rng {
   }
 
   std::uint64_t a_ = 0, b_ = 1, draws_ = 0, sample_ = 0;
+  Real ready_ = -1;
 };
 
 }  // namespace nullmark

@@ -4,6 +4,7 @@
 #include <array>
 #include <type_traits>
 
+#include "estimators/exponentials.h"
 #include "harness/kernel.h"
 
 namespace nullmark {
@@ -43,7 +44,7 @@ class BlockKernel final : public Kernel {
     std::array<Flight, kBlock> flight;
     std::array<Rng, kBlock> rng;
     std::array<std::uint32_t, kBlock> active;
-    std::array<Real, kBlock> x, y, z;
+    std::array<Real, kBlock> x, y, z, ahead{};
     std::array<Real, kBlock*(std::is_same_v<Value, Real> ? 1 : kMaxChannels)> extinction;
   };
 
@@ -138,6 +139,7 @@ class BlockKernel final : public Kernel {
     const Vec3 origin = context.local.origin, direction = context.local.direction;
     std::size_t active = count;
     while (active > 0) {
+      draw_ahead(state, active);
       std::size_t kept = 0;
       for (std::size_t a = 0; a < active; ++a) {
         const std::uint32_t k = state.active[a];
@@ -169,6 +171,14 @@ class BlockKernel final : public Kernel {
         }
       }
     }
+  }
+
+  /// Most walks draw an exponential next; their logarithms are taken together.
+  static void draw_ahead(State& state, std::size_t active) {
+    if constexpr (requires { E::kIgnoresMajorant; }) return;
+    for (std::size_t a = 0; a < active; ++a) state.ahead[a] = state.rng[state.active[a]].peek();
+    negative_logarithms(state.ahead.data(), active, state.ahead.data());
+    for (std::size_t a = 0; a < active; ++a) state.rng[state.active[a]].make_ready(state.ahead[a]);
   }
 
   void finish(State& state, const Ray& ray, std::uint32_t k, Quantity quantity, Real* values) const {

@@ -201,6 +201,7 @@ ExitCode run_command(const RunCommand& command) {
   std::unique_ptr<Journal> journal;
   Earlier earlier;
   if (!to_stdout) {
+    if (std::filesystem::is_directory(output)) throw InputError(output + ": is a folder; expected the path of a results file");
     using Mode = Journal::Mode;
     journal = std::make_unique<Journal>(output, config_hash(plan.config_text),
                                         command.resume  ? Mode::resume

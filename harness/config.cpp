@@ -546,7 +546,7 @@ std::vector<ConfigSource> load_configs(const std::vector<std::string>& paths) {
     } else if (fs::is_directory(path)) {
       std::vector<fs::path> files;
       for (const auto& entry : fs::directory_iterator(path))
-        if (entry.path().extension() == ".json") files.push_back(entry.path());
+        if (entry.path().extension() == ".json" && entry.is_regular_file()) files.push_back(entry.path());
       if (files.empty()) throw InputError(path + ": found no *.json; expected configuration files");
       std::sort(files.begin(), files.end());
       for (const fs::path& file : files) load(file);

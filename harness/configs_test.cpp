@@ -51,7 +51,8 @@ TEST(Configs, Seed004TableIsReproducedAndCorrected) {
     const CellRecord& corrected = find(records, "corrected", row.estimator);
     EXPECT_NEAR(*corrected.channel[0].rmse / row.theory, 1, 0.02) << row.estimator;
     EXPECT_NEAR(*corrected.channel[0].rmse_theory / row.theory, 1, 0.002) << row.estimator;
-    EXPECT_NEAR(*find(records, "as_published", row.published_estimator).channel[0].rmse / row.published, 1, 0.04) << row.estimator;
+    EXPECT_NEAR(*find(records, "as_published", row.published_estimator).channel[0].rmse / row.published, 1, 0.04)
+        << row.estimator;
   }
   EXPECT_NEAR(*find(records, "corrected", "delta").lookups_per_sample, 36.390, 0.01 * 36.390);
   EXPECT_NEAR(*find(records, "corrected", "delta").null_collisions_per_sample, 35.890, 0.01 * 35.890);

@@ -297,7 +297,8 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
 
   const bool timing = options.timing && plan.timing.enabled;
   Workshop workshop(plan);
-  std::vector<PreparedCell> cells = prepare_all(workshop, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
+  std::vector<PreparedCell> cells =
+      prepare_all(workshop, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
   // Statistics of a resumed run stand; a run that was stopped before or while timing still owes the times.
   const std::vector<PreparedCell> untimed = prepare_all(workshop, plan, [&](std::size_t i) {
     const auto record = records.find(i);

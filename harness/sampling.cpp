@@ -15,8 +15,8 @@ constexpr std::uint64_t kBatch = std::uint64_t{1} << kBatchLevel;
 /// Chunks of a cell, at most about: their results are kept until they are merged.
 constexpr std::uint64_t kMostChunks = std::uint64_t{1} << 18;
 
-/// log2 of the samples of one ray that make a chunk.  A power of two, so that a chunk is a complete group of the convergence data; decided
-/// by the plan alone, never by the threads.
+/// log2 of the samples of one ray that make a chunk.  A power of two, so that a chunk is a complete group of the convergence
+/// data; decided by the plan alone, never by the threads.
 int chunk_level(std::size_t rays, std::uint64_t samples) {
   int level = kBatchLevel;
   while (level < 62 && (samples >> level) * rays > kMostChunks && (samples >> level) > 0) ++level;
