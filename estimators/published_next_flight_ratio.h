@@ -12,6 +12,7 @@ struct PublishedNextFlightRatioTracking : NextFlightRatioTracking<Value> {
   static constexpr const char* kName = "next_flight_ratio_published_step";
   static constexpr const char* kSummary = "next-flight ratio tracking with the step law of a published comparison (biased)";
   static constexpr const char* kSource = "Kozelj, Comparison of transmittance and distance estimators: program";
+  static constexpr bool kOwnFlights = true;
 
   using Walk = typename NextFlightRatioTracking<Value>::Walk;
 

@@ -16,6 +16,7 @@ struct PublishedRatioTracking {
   static constexpr const char* kName = "ratio_published_hash";
   static constexpr const char* kSummary = "ratio tracking with the hash generator of a published comparison (biased)";
   static constexpr const char* kSource = "Kozelj, Comparison of transmittance and distance estimators: program";
+  static constexpr bool kOwnFlights = true;
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
 
