@@ -4,8 +4,8 @@
 #include <array>
 #include <type_traits>
 
-#include "estimators/exponentials.h"
 #include "harness/kernel.h"
+#include "media/logarithm.h"
 
 namespace nullmark {
 
@@ -175,7 +175,9 @@ class BlockKernel final : public Kernel {
 
   /// Most walks draw an exponential next; their logarithms are taken together.
   static void draw_ahead(State& state, std::size_t active) {
-    if constexpr (requires { E::kIgnoresMajorant; } || requires { E::kOwnFlights; }) return;
+    if constexpr (
+        requires { E::kIgnoresMajorant; } || requires { E::kOwnFlights; })
+      return;
     for (std::size_t a = 0; a < active; ++a) state.ahead[a] = state.rng[state.active[a]].peek();
     negative_logarithms(state.ahead.data(), active, state.ahead.data());
     for (std::size_t a = 0; a < active; ++a) state.rng[state.active[a]].make_ready(state.ahead[a]);

@@ -16,7 +16,7 @@ Real integral_by_rule(const Function& f, Real a, Real b) {
 /// Bounds from values at the ends of a monotone stretch, a few ulps further apart: exp, log and cos as computed are monotone to
 /// rounding only, and the bounds must hold for the values as computed.
 inline std::pair<Real, Real> outward(std::pair<Real, Real> bounds) {
-  constexpr Real kRounding = 4 * std::numeric_limits<Real>::epsilon();
+  constexpr Real kRounding = 8 * std::numeric_limits<Real>::epsilon();
   return {bounds.first * (1 - kRounding), bounds.second * (1 + kRounding)};
 }
 
@@ -24,6 +24,7 @@ inline std::pair<Real, Real> outward(std::pair<Real, Real> bounds) {
 ///
 /// `Profile` has `Real value(Real s)` = f(s) >= 0, `Real integral(Real a, Real b)` = int_a^b f ds for a < b in closed form and
 /// relatively accurate however close a and b are, `std::pair<Real, Real> extrema(Real a, Real b)`, and where they exist `void
+/// values(Real* s, std::size_t n)` (in place, for a block), `void
 /// knots(std::vector<Real>& s)`, `int polynomial_degree()`, `prepare()`. With `optical_depth` tau > 0, scale = tau / (int_0^1 f
 /// ds * (hi - lo)): the axis then has the transmittance e^-tau whatever the profile's own amplitude; otherwise scale = 1.
 template <class Profile>
@@ -72,7 +73,13 @@ struct AlongAxis {
   /// The axis is chosen once for the block.
   void extinction(const Points& points, Real* out) const {
     const Real* x = axis == 0 ? points.x : axis == 1 ? points.y : points.z;
-    for (std::size_t i = 0; i < points.size; ++i) out[i] = scale * profile.value(coordinate(x[i]));
+    if constexpr (requires { profile.values(out, points.size); }) {
+      for (std::size_t i = 0; i < points.size; ++i) out[i] = coordinate(x[i]);
+      profile.values(out, points.size);
+      for (std::size_t i = 0; i < points.size; ++i) out[i] *= scale;
+    } else {
+      for (std::size_t i = 0; i < points.size; ++i) out[i] = scale * profile.value(coordinate(x[i]));
+    }
   }
 
   Extrema extrema(const Box& box) const {

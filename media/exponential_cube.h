@@ -1,6 +1,7 @@
 #pragma once
 
 #include "media/along_axis.h"
+#include "media/logarithm.h"
 
 namespace nullmark {
 
@@ -26,6 +27,11 @@ struct ExponentialCubeProfile {
 
   Real x(Real s) const { return std::min<Real>(1, std::max<Real>(0, x0 + s * (x1 - x0))); }
   Real value(Real s) const { return -std::log(std::max(kTiny, x(s))) + Real{0}; }
+
+  void values(Real* s, std::size_t n) const {
+    for (std::size_t i = 0; i < n; ++i) s[i] = std::max(kTiny, x(s[i]));
+    negative_logarithms(s, n, s);
+  }
 
   // With y = (u - v) / v the mean of -ln over [v, u] is -ln u + 1 - ln(1 + y) / y: nothing cancels as v -> u.
   Real integral(Real a, Real b) const {

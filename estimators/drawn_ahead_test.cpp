@@ -1,16 +1,15 @@
-#include "estimators/exponentials.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
 #include "estimators/rng.h"
+#include "media/logarithm.h"
 
 namespace nullmark {
 namespace {
 
-TEST(Exponentials, AgreeWithLongDoubleToAFewUlp) {
+TEST(Logarithm, AgreeWithLongDoubleToAFewUlp) {
   std::vector<Real> x{1, 1 - 0x1p-53, 0x1p-53, 0.5, 0.75, 1e-3};
   Rng rng(SampleAddress{1, 2, 3});
   while (x.size() < 16 * 4096) x.push_back(1 - rng.uniform());
@@ -24,20 +23,22 @@ TEST(Exponentials, AgreeWithLongDoubleToAFewUlp) {
   }
 }
 
-TEST(Exponentials, DoNotDependOnTheirPlaceOrNumber) {
+TEST(Logarithm, DoNotDependOnTheirPlaceOrNumber) {
   std::vector<Real> x(64), all(64), one(16), padded(16, 1);
   Rng rng(SampleAddress{4, 5, 6});
   for (Real& value : x) value = 1 - rng.uniform();
   negative_logarithms(x.data(), x.size(), all.data());
   for (std::size_t i = 0; i < x.size(); ++i) {
     padded[i % 16] = x[i];
-    negative_logarithms(padded.data(), 16, one.data());
-    EXPECT_EQ(one[i % 16], all[i]);
+    for (const std::size_t n : {i % 16 + 1, std::size_t{16}}) {
+      negative_logarithms(padded.data(), n, one.data());
+      EXPECT_EQ(one[i % 16], all[i]);
+    }
   }
 }
 
 /// What is drawn ahead serves an exponential and leaves every other draw as it was.
-TEST(Exponentials, AReadyExponentialIsForgottenWhenSomethingElseIsDrawnFirst) {
+TEST(DrawnAhead, AReadyExponentialIsForgottenWhenSomethingElseIsDrawnFirst) {
   const SampleAddress address{7, 8, 9};
   Rng plain(address), ahead(address);
   for (int i = 0; i < 100; ++i) {
