@@ -35,6 +35,7 @@ class BlockKernel final : public Kernel {
   static constexpr std::size_t kBlock = 256;
   /// A walk this long is reported as an error instead of running on: nothing may hang, and nothing may be cut short in silence.
   static constexpr std::uint32_t kMostLookups = 1u << 30;
+  static constexpr std::uint32_t kStepsBetweenStops = 1u << 14;
   /// Relative rounding allowed to an extinction above its bound before it counts as a violation.
   static constexpr Real kSlack = 1e-9;
 
@@ -138,7 +139,8 @@ class BlockKernel final : public Kernel {
     }
     const Vec3 origin = context.local.origin, direction = context.local.direction;
     std::size_t active = count;
-    while (active > 0) {
+    for (std::uint32_t step = 1; active > 0; ++step) {
+      if (step % kStepsBetweenStops == 0 && state.stop()) return;
       draw_ahead(state, active);
       std::size_t kept = 0;
       for (std::size_t a = 0; a < active; ++a) {

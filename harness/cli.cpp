@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -23,12 +24,23 @@
 namespace nullmark {
 namespace {
 
+/// Messages quote what users wrote, line breaks included.
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
 /// Text to a file, or to standard output for "" and "-".
 void deliver(const std::string& text, const std::string& output) {
   if (output.empty() || output == "-")
     fmt::print("{}", text);
   else
     write_atomically(output, text);
+}
+
+ExitCode report(ExitCode code, const std::string& message) {
+  fmt::print(stderr, "nullmark: {}\n", one_line(message));
+  return code;
 }
 
 std::vector<RunRecord> load_all(const std::vector<std::string>& files) {
@@ -69,11 +81,6 @@ class CommandLine {
   }
 
  private:
-  static std::string one_line(std::string text) {
-    std::replace(text.begin(), text.end(), '\n', ' ');
-    return text;
-  }
-
   void refuse_unknown_command(const std::string& word) const {
     std::vector<std::string> names;
     for (const CLI::App* command : app_.get_subcommands({})) names.push_back(command->get_name());
@@ -104,13 +111,21 @@ class CommandLine {
     command->add_flag("--force", run_.force, "Replace results that are there")->excludes("--resume");
     command->add_flag("--dry-run", run_.dry_run, "Print cells, predicted samples, lookups and time; sample nothing");
     command->add_option("--time-budget", run_.time_budget, "Seconds after which no further cell is started")
-        ->check(CLI::NonNegativeNumber);
+        ->check(CLI::Validator(
+            [](const std::string& text) {
+              double seconds = -1;
+              const bool number = CLI::detail::lexical_cast(text, seconds) && std::isfinite(seconds) && seconds >= 0;
+              return number ? std::string() : fmt::format("found \"{}\"; expected seconds >= 0", text);
+            },
+            "SECONDS"));
     command->add_flag("--no-timing", run_.no_timing, "Statistics only");
   }
 
   void add_compare() {
     CLI::App* command = add("compare", "Rank estimators by what accuracy costs in time", [this] {
-      fmt::print("{}", compare_results(load_all(files_), baseline_));
+      const std::string ranking = compare_results(load_all(files_), baseline_);
+      if (ranking.empty()) return report(ExitCode::nothing_ran, "no cell of these results was sampled; nothing to compare");
+      fmt::print("{}", ranking);
       return ExitCode::ok;
     });
     command->add_option("RESULTS", files_, "Results files")->required();
@@ -161,6 +176,7 @@ class CommandLine {
 
   void add_make_volume() {
     CLI::App* command = add("make-volume", "Write a procedural smoke volume (OpenVDB, grid \"density\")", [this] {
+      if (!force_ && std::filesystem::exists(file_)) throw InputError(file_ + ": exists; --force replaces it");
       write_procedural_vdb(file_, volume_);
       return ExitCode::ok;
     });
@@ -168,6 +184,7 @@ class CommandLine {
     command->add_option("--seed", volume_.seed, "Of the noise");
     command->add_option("--resolution", volume_.resolution, "Voxels across");
     command->add_flag("--half", volume_.half, "Store 16-bit values");
+    command->add_flag("--force", force_, "Replace a file that is there");
   }
 
   CLI::App app_{"Benchmark and validation harness for null-collision trackers", "nullmark"};
@@ -179,11 +196,6 @@ class CommandLine {
   std::string file_, baseline_, schema_, format_, output_;
   bool force_ = false;
 };
-
-ExitCode report(ExitCode code, const std::string& message) {
-  fmt::print(stderr, "nullmark: {}\n", message);
-  return code;
-}
 
 ExitCode guarded(int argc, char** argv) {
   try {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "harness/json_input.h"
 #include "harness/names.h"
-#include "media/parameters.h"
 
 namespace nullmark {
 namespace {
@@ -66,16 +66,20 @@ Efficiency efficiency(const CellRecord& record) {
 std::string compare_results(const std::vector<RunRecord>& runs, const std::string& baseline) {
   std::map<std::string, std::vector<Row>> groups;
   std::vector<std::string> order;
-  bool known = baseline.empty();
+  std::vector<std::string> known;
   for (const RunRecord& run : runs)
     for (const CellRecord& record : run.cells) {
       if (record.status != Status::ok) continue;
       std::vector<Row>& rows = groups[group_of(record)];
       if (rows.empty()) order.push_back(group_of(record));
       rows.push_back({&record, efficiency(record)});
-      known = known || record.cell.estimator.label == baseline || record.cell.estimator.type == baseline;
+      known.insert(known.end(), {record.cell.estimator.label, record.cell.estimator.type});
     }
-  if (!known) throw ParameterError("--baseline", fmt::format("no cell of the results has the estimator \"{}\"", baseline));
+  if (!baseline.empty() && std::find(known.begin(), known.end(), baseline) == known.end()) {
+    const std::string near = nearest(baseline, known);
+    throw InputError(fmt::format("--baseline: no cell of the results has the estimator \"{}\"{}", baseline,
+                                 near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
+  }
 
   std::string out;
   for (const std::string& name : order) {

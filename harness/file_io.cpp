@@ -17,7 +17,8 @@ namespace nullmark {
 namespace {
 
 [[noreturn]] void fail(const std::string& path, const char* action) {
-  throw InputError(fmt::format("{}: cannot be {}: {}", path, action, std::strerror(errno)));
+  throw InputError(fmt::format("{}: cannot be {}: {}; give a path in a folder that is there and can be written", path, action,
+                               std::strerror(errno)));
 }
 
 /// A renamed file survives a power cut only once its directory has reached the disk.

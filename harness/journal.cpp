@@ -46,7 +46,9 @@ Journal::~Journal() {
 void Journal::lock() {
   for (;;) {
     file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_APPEND, 0666);
-    if (file_ < 0) throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
+    if (file_ < 0)
+      throw InputError(fmt::format("{}: cannot be written: {}; give an -o in a folder that is there and can be written", path_,
+                                   std::strerror(errno)));
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
       ::close(file_);
       throw InputError(path_ + ": another run is writing these results; wait for it or give another -o");

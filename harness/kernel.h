@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -46,6 +47,9 @@ struct Counters {
 class Workspace {
  public:
   virtual ~Workspace() = default;
+  /// Asked now and then, so that endless walks can be interrupted; once it answers true the block under way is given up and its
+  /// samples must not be used.
+  std::function<bool()> stop = [] { return false; };
 };
 
 /// An estimator with its parameters, compiled for one kind of value.  Immutable; one instance serves all threads.

@@ -85,8 +85,15 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   result.groups.resize(channels);
 
   std::vector<ChunkResult> results(chunks.size());
-  tbb::enumerable_thread_specific<Scratch> scratch([&] { return Scratch{kernel.workspace(), {}, {}}; });
   std::atomic<bool> stopped = false;
+  tbb::enumerable_thread_specific<Scratch> scratch([&] {
+    Scratch fresh{kernel.workspace(), {}, {}};
+    fresh.workspace->stop = [&] {
+      if (stop()) stopped = true;
+      return stopped.load();
+    };
+    return fresh;
+  });
   std::atomic<std::size_t> done = 0;
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t at) {
     if (stopped || stop()) {
