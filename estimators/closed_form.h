@@ -26,7 +26,9 @@ struct ClosedForm {
   Value result(const Walk&, const Passage<Value>& ray) const { return exponential(Value(-*ray.exact_depth)); }
   Value optical_depth(const Walk&, const Passage<Value>& ray) const { return *ray.exact_depth; }
 
-  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const { return {.variance = 0, .lookups = 0}; }
+  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const {
+    return {.variance = 0, .lookups = 0, .lookups_variance = 0};
+  }
 };
 
 }  // namespace nullmark

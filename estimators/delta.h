@@ -100,7 +100,7 @@ struct DeltaTracking {
     Theory theory{.variance = std::exp(-depth) * -std::expm1(-depth)};
     if (depth < profile.optical_depth(c)) theory.mean = std::exp(-depth);
     if (ray.per_channel.empty()) {
-      theory.lookups = lookups_until_killed(profile, killed, [&](const RayProfile::Node& at) { return rate(0, at); });
+      state_lookups_until_killed(theory, profile, killed, [&](const RayProfile::Node& at) { return rate(0, at); });
       return theory;
     }
     Real lookups = 0;

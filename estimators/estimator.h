@@ -27,6 +27,7 @@ struct Theory {
   std::optional<Real> mean{};  ///< left out: the quantity itself
   std::optional<Real> variance{};
   std::optional<Real> lookups{};
+  std::optional<Real> lookups_variance{};  ///< of one sample
 };
 
 /// One ray's way through the medium, as all walks of a block share it.
@@ -61,6 +62,8 @@ struct Passage {
 // and where it has them
 //
 //   void parameters(ParameterVisitor&)
+//   SampleRange range() const                     where the range depends on the parameters
+//   Real order(Quantity) const                    of a consistent estimator: |bias| ~ h^order
 //   using Ray = ...; void prepare(Ray&) const     per-ray data of its own, derived from Passage<Value>; default Ray =
 //   Passage<Value> Value optical_depth(const Walk&, const Ray&) const             answers Quantity::optical_depth as well int
 //   real_collisions(const Walk&, const Ray&) const             tentative collisions that ended a walk; default 0 static constexpr

@@ -68,7 +68,8 @@ struct NextFlightDeltaTracking {
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
     const auto rate = [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); };
     const auto killed = [&](int, const RayProfile::Node& at) { return std::min(at.extinction, rate(at)); };
-    Theory theory{.lookups = lookups_until_killed(profile, killed, rate)};
+    Theory theory;
+    state_lookups_until_killed(theory, profile, killed, rate);
     if (!profile.resolved()) return theory;
     const Real total = ray.majorant.total_depth();
     const auto ahead = profile.running(c, rate);

@@ -37,7 +37,7 @@ struct NextFlightRatioTracking {
   /// M2 = G(0) + int_0^d mub a^2 k G dy over local majorants, with v(y) = exp(-int_y^d mub), a = 1 - mu/mub, G = 2 v T(y,d) - v^2
   /// and k(y) = exp(-int_0^y (2 mu - mu^2/mub)).  Nothing where the panels do not resolve v.
   Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
-    Theory theory{.lookups = ray.majorant.total_depth()};
+    Theory theory{.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
     if (!profile.resolved()) return theory;
     const Real tau = profile.optical_depth(c), total = ray.majorant.total_depth();
     const auto square = [&](Real depth_left, Real tau_left) {

@@ -35,7 +35,8 @@ struct RatioTracking {
     const Real spread = profile.integrate(c, [&](const RayProfile::Node& at) {
       return at.extinction > 0 ? at.extinction * at.extinction / ray.majorant.rate(at.piece) : 0;
     });
-    return {.variance = transmittance * transmittance * std::expm1(spread), .lookups = ray.majorant.total_depth()};
+    const Real lookups = ray.majorant.total_depth();
+    return {.variance = transmittance * transmittance * std::expm1(spread), .lookups = lookups, .lookups_variance = lookups};
   }
 };
 

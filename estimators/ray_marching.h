@@ -33,6 +33,12 @@ struct RayMarching {
     return quantity == Quantity::optical_depth && jittered() ? Claim::unbiased : Claim::consistent;
   }
 
+  /// |bias| ~ h^order on smooth media; a jittered march is biased for T by T Var(tau)/2, and Var(tau) is of order h^2 and h^3.
+  Real order(Quantity) const {
+    if (offset == "stratified") return 3;
+    return offset == "midpoint" || offset == "uniform" ? 2 : 1;
+  }
+
   struct Ray : Passage<Value> {
     Real step = 0, fixed = 0;
     bool uniform = false, stratified = false;
@@ -68,11 +74,12 @@ struct RayMarching {
   Value result(const Walk& walk, const Ray& ray) const { return exponential(Value(-walk.sum * ray.step)); }
 
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity quantity) const {
-    if (!(ray.step > 0)) return {.variance = 0, .lookups = 0};
+    if (!(ray.step > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     Theory theory = ray.stratified ? stratified_march(profile, c, steps, quantity)
                     : ray.uniform  ? uniform_march(profile, c, steps, quantity)
                                    : fixed_march(profile, c, steps, ray.fixed, quantity);
     theory.lookups = steps;
+    theory.lookups_variance = 0;
     return theory;
   }
 };

@@ -54,7 +54,7 @@ struct RegularTracking {
 
   Theory theory(const Ray& ray, const RayProfile&, int, Quantity) const {
     const std::size_t pieces = ray.knots.size() < 2 ? 0 : ray.knots.size() - 1;
-    return {.variance = 0, .lookups = static_cast<Real>(pieces) * ray.rule->size()};
+    return {.variance = 0, .lookups = static_cast<Real>(pieces) * ray.rule->size(), .lookups_variance = 0};
   }
 };
 

@@ -80,8 +80,8 @@ struct ResidualDeltaTracking {
     };
     const Real depth = profile.integrate(c, [&](const RayProfile::Node& at) { return killed(c, at); });
     const Real control = channel(ray.control.depth, c);
-    Theory theory{.variance = std::exp(-2 * control - depth) * -std::expm1(-depth),
-                  .lookups = lookups_until_killed(profile, killed, rate)};
+    Theory theory{.variance = std::exp(-2 * control - depth) * -std::expm1(-depth)};
+    state_lookups_until_killed(theory, profile, killed, rate);
     constexpr Real kRounding = 1e-12;
     if (depth + control < profile.optical_depth(c) * (1 - kRounding)) theory.mean = std::exp(-control - depth);
     return theory;

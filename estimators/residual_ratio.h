@@ -34,6 +34,8 @@ struct ResidualRatioTracking {
 
   Claim claim(Quantity) const { return Claim::unbiased; }
 
+  SampleRange range() const { return choice.rate_scale < 1 ? SampleRange::any_sign : kRange; }
+
   struct Ray : Passage<Value> {
     Control<Value> control;
     Rates residual;
@@ -69,13 +71,14 @@ struct ResidualRatioTracking {
   }
 
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
-    if (!ray.with_residual) return {.variance = 0, .lookups = 0};
+    if (!ray.with_residual) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     const Real spread = profile.integrate(c, [&](const RayProfile::Node& at) {
       const Real rest = at.extinction - channel(ray.control.at(at.t, at.piece), c), rate = ray.residual.rate(at.piece);
       return rate > 0 ? rest * rest / rate : 0;
     });
     const Real log_mean = -profile.optical_depth(c) + (ray.with_control ? 0 : channel(ray.control.depth, c));
-    return {.variance = std::exp(2 * log_mean) * std::expm1(spread), .lookups = ray.residual.total_depth()};
+    const Real lookups = ray.residual.total_depth();
+    return {.variance = std::exp(2 * log_mean) * std::expm1(spread), .lookups = lookups, .lookups_variance = lookups};
   }
 };
 

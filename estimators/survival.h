@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimators/estimator.h"
 #include "estimators/ray_profile.h"
 
 namespace nullmark {
@@ -46,13 +47,24 @@ std::optional<std::vector<Real>> survival(const RayProfile& profile, F&& f) {
   return sum;
 }
 
-/// int rate(node) P(alive) over the ray: the expected lookups of a killed walk.
+/// Moments of the lookups N of a walk that collides at `rate` and dies at `extinction` <= rate: E N = int rate P(alive), and for
+/// one channel, with kappa the running integral of what kills and M that of the rate, E N(N-1) = 2 int rate e^{-kappa} (M -
+/// kappa).
 template <class F, class R>
-std::optional<Real> lookups_until_killed(const RayProfile& profile, F&& extinction, R&& rate) {
+void state_lookups_until_killed(Theory& theory, const RayProfile& profile, F&& extinction, R&& rate) {
   const auto alive = survival(profile, extinction);
-  if (!alive) return std::nullopt;
+  if (!alive) return;
   std::size_t j = 0;
-  return profile.integrate(0, [&](const RayProfile::Node& at) { return rate(at) * (*alive)[j++]; });
+  const Real mean = profile.integrate(0, [&](const RayProfile::Node& at) { return rate(at) * (*alive)[j++]; });
+  theory.lookups = mean;
+  if (profile.channels() > 1) return;
+  const auto survived = profile.running(0, [&](const RayProfile::Node& at) { return rate(at) - extinction(0, at); });
+  j = 0;
+  const Real pairs = profile.integrate(0, [&](const RayProfile::Node& at) {
+    const std::size_t i = j++;
+    return 2 * rate(at) * (*alive)[i] * survived[i];
+  });
+  theory.lookups_variance = std::max<Real>(0, pairs + mean - mean * mean);
 }
 
 }  // namespace nullmark

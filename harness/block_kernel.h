@@ -224,6 +224,15 @@ class EstimatorTemplate final : public EstimatorSource {
     visit_parameters(chromatic_, visit);
   }
   Claim claim(Quantity quantity) const override { return grey_.claim(quantity); }
+  SampleRange range() const override {
+    if constexpr (requires { grey_.range(); }) return grey_.range();
+    return Estimator<Real>::kRange;
+  }
+  bool needs_bound() const override { return Estimator<Real>::kNeedsBound; }
+  std::optional<Real> order(Quantity quantity) const override {
+    if constexpr (requires { grey_.order(quantity); }) return grey_.order(quantity);
+    return std::nullopt;
+  }
   void check(const Extrema& medium) const override {
     if constexpr (requires { grey_.check(medium); }) grey_.check(medium);
   }

@@ -14,10 +14,12 @@
 #include "harness/export.h"
 #include "harness/file_io.h"
 #include "harness/json_input.h"
+#include "harness/junit.h"
 #include "harness/merge.h"
 #include "harness/provenance.h"
 #include "harness/results_json.h"
 #include "harness/schema.h"
+#include "harness/summary.h"
 #include "media/registry.h"
 #include "media/vdb_writer.h"
 
@@ -58,6 +60,7 @@ class CommandLine {
     app_.require_subcommand(1);
     app_.failure_message(CLI::FailureMessage::simple);
     add_run();
+    add_check();
     add_compare();
     add_list();
     add_schema();
@@ -119,6 +122,20 @@ class CommandLine {
             },
             "SECONDS"));
     command->add_flag("--no-timing", run_.no_timing, "Statistics only");
+  }
+
+  void add_check() {
+    CLI::App* command = add("check", "Verdicts on bias and expected lookups, derived from the results file alone", [this] {
+      RunRecord run = load_all({file_})[0];
+      const Summary summary = summarise(run);
+      if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
+      if (!markdown_.empty()) write_atomically(markdown_, summary_markdown(run, summary, file_));
+      fmt::print("{}", summary_text(run, summary));
+      return summary.exit;
+    });
+    command->add_option("RESULTS", file_, "Results file")->required();
+    command->add_option("--junit", junit_, "Also write a JUnit report");
+    command->add_option("--markdown", markdown_, "Also write a summary for a pull request");
   }
 
   void add_compare() {
@@ -193,7 +210,7 @@ class CommandLine {
   ListCommand list_;
   ProceduralVdb volume_;
   std::vector<std::string> files_;
-  std::string file_, baseline_, schema_, format_, output_;
+  std::string file_, baseline_, schema_, format_, output_, junit_, markdown_;
   bool force_ = false;
 };
 

@@ -37,7 +37,7 @@ constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
 
 const std::vector<std::string> kAxes = {"estimator",       "medium",        "majorant", "rays",       "quantity",
                                         "samples_per_ray", "equal_lookups", "seed",     "measurement"};
-const std::vector<std::string> kSingle = {"images", "image_maximum", "own_streams"};
+const std::vector<std::string> kSingle = {"images", "image_maximum", "own_streams", "gate"};
 
 std::vector<std::string> joined(std::vector<std::string> a, const std::vector<std::string>& b) {
   a.insert(a.end(), b.begin(), b.end());
@@ -63,6 +63,17 @@ Real read_positive(const Place& place) {
   const Real value = place.number();
   if (!(value > 0) || !std::isfinite(value)) place.expected("a finite number > 0");
   return value;
+}
+
+GateSpec read_gate(const Place& place) {
+  place.expect_keys({"enabled", "epsilon", "max_samples_per_ray", "max_lookups_per_ray"});
+  GateSpec gate;
+  if (place.has("enabled")) gate.enabled = place["enabled"].boolean();
+  if (place.has("epsilon")) gate.epsilon = read_positive(place["epsilon"]);
+  if (place.has("max_samples_per_ray"))
+    gate.max_samples_per_ray = place["max_samples_per_ray"].unsigned_integer(0, std::uint64_t{1} << 53);
+  if (place.has("max_lookups_per_ray")) gate.max_lookups_per_ray = read_positive(place["max_lookups_per_ray"]);
+  return gate;
 }
 
 template <class Value, class Set>
@@ -121,6 +132,7 @@ std::vector<Setter> read_axis(const std::string& key, const Place& place) {
     });
   if (key == "image_maximum")
     return setters(std::vector{read_positive(place)}, [](Draft& d, Real maximum) { d.cell.image_maximum = maximum; });
+  if (key == "gate") return setters(std::vector{read_gate(place)}, [](Draft& d, const GateSpec& gate) { d.cell.gate = gate; });
   const bool flag = place.boolean();
   return {key == "images" ? Setter([flag](Draft& d) { d.cell.images = flag; })
                           : Setter([flag](Draft& d) { d.cell.own_streams = flag; })};
@@ -346,6 +358,20 @@ TimingPlan read_timing(const Place& place) {
   return timing;
 }
 
+Real read_level(const Place& place) {
+  const Real value = place.number();
+  if (!(value > 0 && value < 1)) place.expected("a number between 0 and 1");
+  return value;
+}
+
+GateLevels read_levels(const Place& place) {
+  place.expect_keys({"alpha", "alpha_pass"});
+  GateLevels levels;
+  if (place.has("alpha")) levels.alpha = read_level(place["alpha"]);
+  if (place.has("alpha_pass")) levels.alpha_pass = read_level(place["alpha_pass"]);
+  return levels;
+}
+
 bool agree(const TimingPlan& a, const TimingPlan& b) {
   return a.enabled == b.enabled && a.repetitions == b.repetitions && a.seconds == b.seconds &&
          a.samples_per_traversal == b.samples_per_traversal;
@@ -373,6 +399,7 @@ struct DraftTable {
 struct DraftPlan {
   std::string file, name;
   TimingPlan timing;
+  GateLevels levels;
   std::vector<Draft> cells;
   std::vector<DraftTable> tables;
 };
@@ -438,12 +465,13 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
     top.fail(fmt::format("found {}; expected the first key \"$schema\": \"{}\"",
                          json.empty() ? "an empty object" : "\"" + json.begin().key() + "\"", kConfigSchema));
   if (top["$schema"].string() != kConfigSchema) top["$schema"].expected(fmt::format("\"{}\"", kConfigSchema));
-  top.expect_keys({"$schema", "name", "seed", "timing", "experiments", "tables"});
+  top.expect_keys({"$schema", "name", "seed", "timing", "verdict", "experiments", "tables"});
 
   DraftPlan plan;
   plan.file = source.file;
   plan.name = top.has("name") ? top["name"].string() : std::filesystem::path(source.file).stem().string();
   if (top.has("timing")) plan.timing = read_timing(top["timing"]);
+  if (top.has("verdict")) plan.levels = read_levels(top["verdict"]);
   std::uint64_t own_seed = 1;
   if (top.has("seed")) own_seed = top["seed"].unsigned_integer(0, kAny);
   std::vector<std::string> experiments;
@@ -506,11 +534,15 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
 
   Plan plan;
   plan.timing = files.front().timing;
+  plan.levels = files.front().levels;
   PlanBuilder builder(plan);
   for (const DraftPlan& file : files) {
     plan.name += (plan.name.empty() ? "" : "+") + file.name;
     if (!agree(file.timing, plan.timing))
       throw InputError(fmt::format("{}: /timing: differs from that of {}; expected the same, or run the files one by one",
+                                   file.file, files.front().file));
+    if (!(file.levels == plan.levels))
+      throw InputError(fmt::format("{}: /verdict: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
     for (const Draft& draft : file.cells) builder.add(draft);
   }

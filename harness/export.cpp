@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "harness/junit.h"
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/results_json.h"
@@ -137,67 +138,6 @@ std::string jsonl(const RunRecord& run) {
   std::string text;
   for (const CellRecord& record : run.cells) text += cell_json(record).dump() + "\n";
   return text;
-}
-
-std::string xml(const std::string& text) {
-  std::string result;
-  for (const char c : text) switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      // XML has no way to write control characters.
-      default:
-        result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  return result;
-}
-
-std::string shell_quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? "'\\''" : std::string(1, c);
-  return result + "'";
-}
-
-/// Runs the cell again from the configuration that the results hold.
-std::string reproduction(const CellRecord& record, const std::string& file) {
-  std::string pattern;
-  for (const char c : record.cell.name) {
-    if (std::string_view("\\^$.|?*+()[]{}").find(c) != std::string_view::npos) pattern += '\\';
-    pattern += c;
-  }
-  return fmt::format("jq .config {} | nullmark run - -o - --filter {}", shell_quoted(file), shell_quoted("^" + pattern + "$"));
-}
-
-std::string junit(const RunRecord& run, const std::string& file) {
-  std::string cases;
-  std::size_t errors = 0, skipped = 0;
-  for (const CellRecord& record : run.cells) {
-    cases += fmt::format("    <testcase classname=\"{}\" name=\"{}\"", xml(record.cell.experiment), xml(record.cell.name));
-    if (record.status == Status::ok) {
-      cases += "/>\n";
-      continue;
-    }
-    const bool error = record.status == Status::error;
-    ++(error ? errors : skipped);
-    const char* element = error ? "error" : "skipped";
-    cases += fmt::format(">\n      <{0} message=\"{1}\">{2}</{0}>\n    </testcase>\n", element,
-                         xml(record.reason.empty() ? to_string(record.status) : record.reason), xml(reproduction(record, file)));
-  }
-  const std::string counts =
-      fmt::format("tests=\"{}\" failures=\"0\" errors=\"{}\" skipped=\"{}\"", run.cells.size(), errors, skipped);
-  return fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites {0}>\n  <testsuite name=\"{1}\" {0}>\n{2}  "
-      "</testsuite>\n</testsuites>\n",
-      counts, xml(run.name), cases);
 }
 
 }  // namespace

@@ -47,6 +47,24 @@ struct Measurement {
   bool operator==(const Measurement&) const = default;
 };
 
+/// What a cell's verdict must prove and what that may cost.
+struct GateSpec {
+  bool enabled = true;
+  std::optional<Real> epsilon{};              ///< relative to the mean reference; left out: by the optical depth, see gate.cpp
+  std::uint64_t max_samples_per_ray = 0;      ///< beyond samples_per_ray, where undecided; 0: no further ones
+  std::optional<Real> max_lookups_per_ray{};  ///< expected lookups that all samples of a ray may cost
+
+  bool operator==(const GateSpec&) const = default;
+};
+
+/// Error levels of a whole configuration.
+struct GateLevels {
+  Real alpha = 1e-4;       ///< chance of even one false FAIL among all mean tests, and the same among all lookup tests
+  Real alpha_pass = 1e-3;  ///< chance of a false PASS, of each test
+
+  bool operator==(const GateLevels&) const = default;
+};
+
 /// One point of a sweep.  Indices refer to the plan's lists, in which equal specifications stand once.
 struct Cell {
   std::string id;    ///< hash of everything that decides the statistics
@@ -62,6 +80,7 @@ struct Cell {
   bool own_streams = false;  ///< streams keyed by the estimator too, instead of common random numbers
   bool images = false;
   Real image_maximum = 1;  ///< value shown white
+  GateSpec gate{};
 };
 
 /// How wall time is measured: one thread, repetitions interleaved at random over all cells.
@@ -93,6 +112,7 @@ struct Plan {
   std::vector<Component> ray_sets;
   std::vector<Cell> cells;
   TimingPlan timing;
+  GateLevels levels;
   std::vector<Table> tables;
   std::string config_text;  ///< the configuration as applied, JSON
 };

@@ -41,12 +41,51 @@ struct TimeRecord {
   std::vector<Real> repetition_ns;  ///< ns per sample of each repetition
 };
 
+/// PASS: |bias| < epsilon is proven.  FAIL: bias is proven.  INCONCLUSIVE: neither, with the reason.  VIOLATED: the estimator
+/// needs a true majorant and did not have one.  Empty: nothing is claimed, or nothing was tested.
+enum class Outcome { none, pass, fail, inconclusive, violated };
+
+/// Evidence of one test, as `check` derives its outcome.
+struct TestRecord {
+  int channel = 0;  ///< -1: lookups
+  int group = -1;   ///< -1: all rays
+  std::uint64_t samples = 0;
+  Real epsilon = 0, reference_error = 0;  ///< absolute
+  Real variance = 0;                      ///< that the bets were planned with
+  std::string basis;                      ///< "betting", "catoni", "catoni+betting", "deterministic"
+  Real log_e_fail = 0, log_e_low = 0, log_e_high = 0;
+  Real largest_error = 0, rounding = 0;  ///< of single samples; deterministic tests
+  std::uint64_t planned = 0;             ///< samples per ray
+  std::vector<Real> rates;               ///< of the bets against "mean error 0"
+  Outcome outcome = Outcome::none;
+};
+
+struct VerdictRecord {
+  /// Of the mean: against the reference for estimators that claim to be unbiased, else against the mean they predict of
+  /// themselves, which proves nothing about T.
+  Outcome unbiased = Outcome::none, own_mean = Outcome::none;
+  Outcome lookups = Outcome::none;
+  std::string reason;                         ///< of an INCONCLUSIVE, or what fails
+  std::string against;                        ///< "reference", or "own mean" of an estimator that predicts its bias
+  std::string variance_basis;                 ///< "analytic", "pilot" or "none"
+  bool planned_undecidable = false;           ///< the plan said beforehand that no affordable number of samples decides
+  bool violated = false;                      ///< needs a true majorant, and violations were counted
+  std::uint64_t nonfinite = 0;                ///< among the samples beyond the planned ones
+  std::uint64_t out_of_range = 0;             ///< samples outside the range the estimator declares
+  std::uint64_t samples_per_ray = 0;          ///< used in the end
+  std::uint64_t planned = 0, affordable = 0;  ///< samples per ray
+  std::uint64_t family = 1, lookups_family = 1;
+  Real alpha = 1e-4, alpha_pass = 1e-3;
+  std::vector<TestRecord> tests;
+};
+
 struct CellRecord {
   Cell cell;
   MediumSpec medium;
   Component majorant, ray_set;
   std::string medium_hash;
   std::string claims, range;
+  std::optional<Real> order;  ///< of a consistent estimator's bias in its step
   int channels = 1;
   std::vector<std::string> effects{"absorption"};
   Status status = Status::not_run;
@@ -60,6 +99,7 @@ struct CellRecord {
   std::uint64_t majorant_violations = 0, nonfinite = 0;
   std::optional<Real> largest_violation;  ///< max mu / mub seen beyond 1
   std::optional<TimeRecord> time;
+  std::optional<VerdictRecord> verdict;
   std::vector<ConvergenceRecord> convergence;
   std::map<std::string, std::string> images;  ///< "mean", "variance", "lookups" -> path relative to the results file
 };

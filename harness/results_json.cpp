@@ -11,6 +11,7 @@
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 #include "harness/spec_json.h"
+#include "harness/verdict_json.h"
 
 namespace nullmark {
 namespace {
@@ -234,6 +235,7 @@ Json cell_json(const CellRecord& record) {
   Json estimator = typed(cell.estimator);
   estimator["claims"] = record.claims;
   estimator["range"] = record.range;
+  if (record.order) estimator["order"] = *record.order;
   Json medium = typed(record.medium);
   medium["hash"] = record.medium_hash;
 
@@ -277,6 +279,7 @@ Json cell_json(const CellRecord& record) {
       {"majorant_violations", record.majorant_violations},
       {"largest_violation", real(record.largest_violation)},
       {"nonfinite", record.nonfinite},
+      {"verdict", record.verdict ? verdict_json(*record.verdict) : Json(nullptr)},
       {"time", time_json(record)},
       {"efficiency", {{"variance_x_lookups", per_channel(record, [&](std::size_t c) { return variance_x_lookups(record, c); })}}},
       {"convergence", convergence_json(record)},
@@ -295,6 +298,7 @@ CellRecord read_cell(const Place& place) {
   cell.estimator = read_component(ComponentKind::estimator, place["estimator"]);
   record.claims = place["estimator"]["claims"].string();
   record.range = place["estimator"]["range"].string();
+  record.order = optional_real(place["estimator"], "order");
   record.medium = read_medium(place["medium"]);
   record.medium_hash = string_or_empty(place["medium"], "hash");
   record.majorant = read_component(ComponentKind::majorant, place["majorant"]);
@@ -328,6 +332,7 @@ CellRecord read_cell(const Place& place) {
   record.majorant_violations = count(place, "majorant_violations");
   record.largest_violation = optional_real(place, "largest_violation");
   record.nonfinite = count(place, "nonfinite");
+  if (place.has("verdict") && !place["verdict"].json().is_null()) record.verdict = read_verdict(place["verdict"]);
   if (place.has("time") && !place["time"].json().is_null()) record.time = read_time(place["time"]);
   if (place.has("convergence"))
     for (const Place& step : place["convergence"].elements())

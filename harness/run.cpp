@@ -14,6 +14,7 @@
 #include "harness/parameter_values.h"
 #include "harness/sampling.h"
 #include "harness/timing.h"
+#include "harness/verdict.h"
 
 namespace nullmark {
 namespace {
@@ -27,6 +28,15 @@ struct PreparedCell {
   std::string reason;
   CellTheory theory;
   std::uint64_t samples_per_ray = 0;
+  Claim claim = Claim::unbiased;
+  SampleRange range = SampleRange::any_sign;
+  bool needs_bound = false;
+
+  Cell planned() const {
+    Cell planned = *cell;
+    planned.samples_per_ray = samples_per_ray;
+    return planned;
+  }
 };
 
 /// Adds the component's JSON pointer to what its construction complains of.
@@ -45,7 +55,10 @@ class Workshop {
   explicit Workshop(const Plan& plan) : plan_(plan) {}
 
   PreparedCell prepare(const Cell& cell, std::size_t index) {
-    PreparedCell prepared{&cell, index, nullptr, nullptr, "", {}, cell.samples_per_ray};
+    PreparedCell prepared;
+    prepared.cell = &cell;
+    prepared.index = index;
+    prepared.samples_per_ray = cell.samples_per_ray;
     const MediumSpec& spec = plan_.media[cell.medium];
     if (const auto missing = missing_.find(cell.medium); missing != missing_.end()) {
       prepared.reason = missing->second;
@@ -62,6 +75,9 @@ class Workshop {
     }
     const auto source = located(cell.estimator.pointer, [&] { return make_estimator(cell.estimator); });
     located(cell.estimator.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
+    prepared.claim = source->claim(cell.quantity);
+    prepared.range = source->range();
+    prepared.needs_bound = source->needs_bound();
     prepared.kernel = source->kernel(prepared.scene->medium->medium->channels());
     prepared.reason = why_not(cell, *prepared.scene, *prepared.kernel);
     return prepared;
@@ -143,6 +159,101 @@ void add_theory(std::vector<PreparedCell>& cells) {
   }
 }
 
+/// Sizes of the families that a verdict's levels are shared out over.
+struct Families {
+  std::uint64_t means = 1, lookups = 1;
+};
+
+/// Variances from samples of their own, where theory has none.
+std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function<bool()>& stop) {
+  // Far beyond the samples of any verdict, so that the streams are others.
+  constexpr std::uint64_t kFirst = std::uint64_t{1} << 62;
+  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, {kFirst, prepared.samples_per_ray},
+                                   nullptr, stop, [](double) {});
+  if (!sampled || prepared.samples_per_ray < 2) return std::nullopt;
+  Pilot pilot;
+  const auto channels = static_cast<std::size_t>(prepared.scene->reference->channels);
+  std::vector<Moments> pooled(channels);
+  for (std::size_t i = 0; i < sampled->moments.size(); ++i) {
+    pilot.variance.push_back(sampled->moments[i].variance());
+    pooled[i % channels] += sampled->moments[i];
+  }
+  const auto n = static_cast<Real>(prepared.samples_per_ray);
+  for (std::size_t ray = 0; ray < sampled->lookups.size(); ++ray) {
+    const Real mean = static_cast<Real>(sampled->lookups[ray]) / n;
+    pilot.lookups_variance.push_back(std::max<Real>(0, (sampled->lookups_squared[ray] - n * mean * mean) / (n - 1)));
+  }
+  for (const Moments& moments : pooled)
+    if (moments.s2 > 0)
+      pilot.variance_of_variance =
+          std::max(pilot.variance_of_variance, moments.s4 / (moments.s2 * moments.s2) - 1 / static_cast<Real>(moments.count));
+  return pilot;
+}
+
+/// The tests of a cell; nothing for cells that claim nothing that could be tested.
+std::optional<CellGate> gate_of(PreparedCell& prepared, const GateLevels& levels, const std::function<bool()>& stop) {
+  const bool predicts_itself = !prepared.theory.ray_variance.empty();
+  const bool claims = prepared.claim == Claim::exact || prepared.claim == Claim::unbiased ||
+                      (prepared.claim == Claim::consistent && predicts_itself);
+  if (!prepared.cell->gate.enabled || !claims || !(prepared.cell->measurement == Measurement{})) return std::nullopt;
+  if (prepared.theory.ray_expected.empty())
+    prepared.theory.ray_expected = expected_of(*prepared.scene, *prepared.kernel, prepared.cell->quantity);
+  const bool spread_missing = !prepared.theory.ray_lookups.empty() && prepared.theory.ray_lookups_variance.empty();
+  std::optional<Pilot> pilot;
+  if (prepared.theory.ray_variance.empty() || spread_missing) pilot = run_pilot(prepared, stop);
+  return plan_gate(prepared.planned(), *prepared.scene, prepared.range, prepared.claim,
+                   bounds_everywhere(*prepared.scene, *prepared.kernel), prepared.theory, pilot, levels);
+}
+
+/// Looks at the evidence of the planned samples and draws further ones while the verdict is open, as many again each time, up to
+/// four times what the plan foresees and never more than is allowed.  Nothing where interrupted.
+std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
+                                   const GateLevels& levels, const Families& families, const std::function<bool()>& stop,
+                                   const std::function<void(double)>& progress) {
+  constexpr std::uint64_t kPatience = 4;
+  VerdictRecord verdict;
+  verdict.against = gate.against;
+  verdict.variance_basis = gate.variance_basis;
+  verdict.family = families.means;
+  verdict.lookups_family = families.lookups;
+  verdict.alpha = levels.alpha;
+  verdict.alpha_pass = levels.alpha_pass;
+  verdict.planned = gate.planned;
+  verdict.affordable = gate.affordable;
+  verdict.planned_undecidable = !gate.undecidable.empty();
+  verdict.reason = gate.undecidable;
+  verdict.samples_per_ray = prepared.samples_per_ray;
+  std::uint64_t violations = sampled.counters.violations;
+  verdict.out_of_range = sampled.out_of_range;
+  std::uint64_t wanted = 0;
+  for (const MeanTest& test : gate.tests)
+    if (test.planned <= gate.affordable) wanted = std::max(wanted, test.planned);
+  const std::uint64_t most =
+      std::max(prepared.samples_per_ray, std::min(gate.affordable, verdict.planned_undecidable ? 0 : kPatience * wanted));
+  std::vector<Evidence> evidence = sampled.evidence;
+  for (;;) {
+    verdict.violated = prepared.needs_bound && violations > 0;
+    verdict.tests.clear();
+    for (std::size_t i = 0; i < gate.tests.size(); ++i)
+      verdict.tests.push_back(test_record(
+          gate.tests[i], evidence[i], gate.tests[i].channel == MeanTest::kLookups ? gate.lookups_per_sum : gate.errors_per_sum));
+    decide(verdict);
+    const Outcome mean = gate.against == "own mean" ? verdict.own_mean : verdict.unbiased;
+    const bool open = mean == Outcome::inconclusive || (mean == Outcome::pass && verdict.lookups == Outcome::inconclusive);
+    if (!open || verdict.samples_per_ray >= most) return verdict;
+    constexpr std::uint64_t kRound = 64;
+    const std::uint64_t left = (most - verdict.samples_per_ray + kRound - 1) / kRound * kRound;
+    const SampleSpan span{verdict.samples_per_ray, std::min(verdict.samples_per_ray, left)};
+    const auto more = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, span, &gate, stop, progress);
+    if (!more) return std::nullopt;
+    for (std::size_t i = 0; i < evidence.size(); ++i) evidence[i] += more->evidence[i];
+    verdict.samples_per_ray += span.per_ray;
+    verdict.out_of_range += more->out_of_range;
+    violations += more->counters.violations;
+    verdict.nonfinite += more->nonfinite;
+  }
+}
+
 std::optional<Real> finite(Real x) { return std::isfinite(x) ? std::optional(x) : std::nullopt; }
 
 CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
@@ -156,6 +267,7 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
   const auto* entry = Registry<EstimatorEntry>::instance().find(cell.estimator.type);
   record.claims = to_string(make_estimator(cell.estimator)->claim(cell.quantity));
   record.range = to_string(entry->range);
+  record.order = make_estimator(cell.estimator)->order(cell.quantity);
   if (prepared.scene) {
     record.channels = prepared.scene->medium->medium->channels();
     record.rays = prepared.scene->rays->world.size();
@@ -296,6 +408,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
       if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = record;
 
   const bool timing = options.timing && plan.timing.enabled;
+  const Families families{mean_family(plan), lookups_family(plan)};
   Workshop workshop(plan);
   std::vector<PreparedCell> cells =
       prepare_all(workshop, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
@@ -320,14 +433,17 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     } else if (options.time_budget && seconds > *options.time_budget) {
       record.reason = "time budget spent";
     } else {
-      Cell cell = *prepared.cell;
-      cell.samples_per_ray = prepared.samples_per_ray;
-      const auto sampled = sample_cell(cell, *prepared.scene, *prepared.kernel, stop,
-                                       [&](double fraction) { observer.progress(record, fraction); });
-      if (!sampled) {
+      const auto progress = [&](double fraction) { observer.progress(record, fraction); };
+      const std::optional<CellGate> gate = gate_of(prepared, plan.levels, stop);
+      const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, {0, prepared.samples_per_ray},
+                                       gate ? &*gate : nullptr, stop, progress);
+      std::optional<VerdictRecord> verdict;
+      if (sampled && gate) verdict = judge(prepared, *gate, *sampled, plan.levels, families, stop, progress);
+      if (!sampled || (gate && !verdict)) {
         record.reason = "interrupted";
       } else {
         fill_statistics(record, prepared, *sampled);
+        if (record.status == Status::ok) record.verdict = verdict;
         write_images(record, prepared, *sampled, options, observer);
         if (record.status == Status::ok) to_time.push_back(&prepared);
       }

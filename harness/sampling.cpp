@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <cmath>
+#include <map>
 
 namespace nullmark {
 namespace {
@@ -34,8 +35,92 @@ struct ChunkResult {
   std::vector<Real> group_sums;  ///< per channel, of a split ray's chunk
   std::vector<GroupErrors> groups;
   std::vector<std::uint64_t> lookups;
+  std::vector<Real> lookups_squared;
   Counters counters;
-  std::uint64_t nonfinite = 0;
+  std::uint64_t nonfinite = 0, out_of_range = 0;
+  std::map<std::size_t, Evidence> evidence;  ///< by test; a chunk touches few of them
+};
+
+/// Errors on their way to the tests of a gate: summed in short runs, gathered over rays, and bet on by the thousand.
+class Evidences {
+ public:
+  Evidences(const CellGate* gate, std::size_t channels, std::map<std::size_t, Evidence>& out)
+      : gate_(gate), out_(out), pooled_(channels), grouped_(channels) {
+    if (!gate_) return;
+    pending_.resize(gate_->tests.size());
+    for (std::size_t i = 0; i < gate_->tests.size(); ++i) {
+      const MeanTest& test = gate_->tests[i];
+      if (test.channel == MeanTest::kLookups) {
+        lookups_ = i;
+      } else if (test.group == MeanTest::kAllRays) {
+        pooled_[static_cast<std::size_t>(test.channel)] = i;
+      } else {
+        auto& list = grouped_[static_cast<std::size_t>(test.channel)];
+        list.resize(std::max(list.size(), static_cast<std::size_t>(test.group) + 1));
+        list[static_cast<std::size_t>(test.group)] = i;
+      }
+    }
+  }
+
+  void add_errors(std::size_t ray, std::size_t channel, std::span<const Real> errors) {
+    if (!gate_ || !pooled_[channel]) return;
+    sum(errors, gate_->errors_per_sum);
+    feed(*pooled_[channel]);
+    if (!grouped_[channel].empty()) feed(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])]);
+  }
+
+  void add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups) {
+    if (!gate_ || !lookups_) return;
+    errors_.clear();
+    for (const std::uint32_t n : lookups) errors_.push_back(static_cast<Real>(n) - gate_->lookups[ray]);
+    sum(errors_, gate_->lookups_per_sum);
+    feed(*lookups_);
+  }
+
+  void finish() {
+    for (std::size_t test = 0; test < pending_.size(); ++test) flush(test);
+  }
+
+ private:
+  static constexpr std::size_t kTogether = 8192;
+
+  void sum(std::span<const Real> errors, int together) {
+    sums_.clear();
+    largest_ = 0;
+    for (std::size_t i = 0; i < errors.size(); i += static_cast<std::size_t>(together)) {
+      Real total = 0;
+      for (int k = 0; k < together; ++k) {
+        const Real error = errors[i + static_cast<std::size_t>(k)];
+        total += error;
+        largest_ = std::max(largest_, std::abs(error));
+      }
+      sums_.push_back(total);
+    }
+  }
+
+  void feed(std::size_t test) {
+    std::vector<Real>& waiting = pending_[test];
+    waiting.insert(waiting.end(), sums_.begin(), sums_.end());
+    Evidence& evidence = out_[test];
+    evidence.largest_error = std::max(evidence.largest_error, largest_);
+    if (waiting.size() >= kTogether) flush(test);
+  }
+
+  void flush(std::size_t test) {
+    if (pending_[test].empty()) return;
+    const MeanTest& plan = gate_->tests[test];
+    out_[test].add(plan, pending_[test], plan.channel == MeanTest::kLookups ? gate_->lookups_per_sum : gate_->errors_per_sum);
+    pending_[test].clear();
+  }
+
+  const CellGate* gate_;
+  std::map<std::size_t, Evidence>& out_;
+  std::vector<std::optional<std::size_t>> pooled_;                // test by channel
+  std::vector<std::vector<std::optional<std::size_t>>> grouped_;  // by channel and group
+  std::optional<std::size_t> lookups_;
+  std::vector<std::vector<Real>> pending_;  // by test
+  std::vector<Real> sums_, errors_;
+  Real largest_ = 0;
 };
 
 std::vector<Chunk> cut(std::size_t rays, std::uint64_t samples, std::uint64_t chunk) {
@@ -56,7 +141,11 @@ struct Scratch {
   std::unique_ptr<Workspace> workspace;
   RayContext context;
   SampleBlock block;
+  std::vector<Real> errors;
 };
+
+/// Rounding allowed to samples at the ends of their declared range.
+constexpr Real kRangeSlack = 1e-9;
 
 }  // namespace
 
@@ -69,25 +158,30 @@ Real measured(Real value, const Measurement& measurement) {
   return value;
 }
 
-std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const Kernel& kernel, const std::function<bool()>& stop,
+std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleSpan span,
+                                   const CellGate* gate, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress) {
   const std::size_t rays = scene.rays->local.size();
   const auto channels = static_cast<std::size_t>(scene.reference->channels);
   const std::uint64_t key = stream_key(cell, *scene.medium);
-  const int level = chunk_level(rays, cell.samples_per_ray);
+  const int level = chunk_level(rays, span.per_ray);
   const std::uint64_t whole_chunk = std::uint64_t{1} << level;
-  const std::vector<Chunk> chunks = cut(rays, cell.samples_per_ray, whole_chunk);
+  const std::vector<Chunk> chunks = cut(rays, span.per_ray, whole_chunk);
 
   Sampled result;
   result.moments.resize(rays * channels);
   result.reference.resize(rays * channels);
   result.lookups.resize(rays);
+  result.lookups_squared.resize(rays);
   result.groups.resize(channels);
+
+  if (gate) result.evidence.resize(gate->tests.size());
 
   std::vector<ChunkResult> results(chunks.size());
   std::atomic<bool> stopped = false;
   tbb::enumerable_thread_specific<Scratch> scratch([&] {
-    Scratch fresh{kernel.workspace(), {}, {}};
+    Scratch fresh;
+    fresh.workspace = kernel.workspace();
     fresh.workspace->stop = [&] {
       if (stop()) stopped = true;
       return stopped.load();
@@ -105,8 +199,10 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     Scratch& mine = scratch.local();
     out.moments.resize((chunk.end_ray - chunk.first_ray) * channels);
     out.lookups.resize(chunk.end_ray - chunk.first_ray);
+    out.lookups_squared.resize(chunk.end_ray - chunk.first_ray);
     out.groups.resize(channels);
     out.group_sums.assign(channels, 0);
+    Evidences evidences(gate, channels, out.evidence);
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
       scene.context(ray, kernel, mine.context);
       kernel.begin_ray(*mine.workspace, *scene.medium->medium, scene.medium->extrema, mine.context);
@@ -118,22 +214,30 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
       for (std::uint64_t drawn = 0; drawn < chunk.count && !stopped; drawn += kBatch) {
         if (drawn > 0 && stop()) stopped = true;
         const std::uint64_t batch = std::min(kBatch, chunk.count - drawn);
-        kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, chunk.first + drawn, batch, cell.quantity,
-                      mine.block, out.counters);
+        kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, span.first + chunk.first + drawn, batch,
+                      cell.quantity, mine.block, out.counters);
+        mine.errors.resize(batch);
         for (std::size_t c = 0; c < channels; ++c) {
           Moments& moments = out.moments[local * channels + c];
           const Real reference = measured(expected[static_cast<Eigen::Index>(c)], cell.measurement);
+          const Real shift = gate ? gate->shift[ray * channels + c] : 0;
           for (std::size_t i = 0; i < batch; ++i) {
             const Real value = mine.block.values[i * channels + c];
+            mine.errors[i] = 0;
             if (!std::isfinite(value)) {
               ++out.nonfinite;
               continue;
             }
+            if (gate && !(value >= gate->low - kRangeSlack && value <= gate->high + kRangeSlack)) ++out.out_of_range;
             const Real error = measured(value, cell.measurement) - reference;
             moments.add(error);
             out.groups[c].add(error);
+            mine.errors[i] = error - shift;
           }
+          evidences.add_errors(ray, c, mine.errors);
         }
+        evidences.add_lookups(ray, mine.block.lookups);
+        for (const std::uint32_t n : mine.block.lookups) out.lookups_squared[local] += static_cast<Real>(n) * n;
       }
       out.lookups[local] = out.counters.lookups - lookups_before;
       for (std::size_t c = 0; c < channels; ++c) {
@@ -141,6 +245,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         out.groups[c].finish_ray();
       }
     }
+    evidences.finish();
     progress(static_cast<double>(++done) / static_cast<double>(chunks.size()));
   });
   if (stopped) return std::nullopt;
@@ -153,17 +258,20 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
       for (std::size_t c = 0; c < channels; ++c)
         result.moments[ray * channels + c] += part.moments[(ray - chunk.first_ray) * channels + c];
       result.lookups[ray] += part.lookups[ray - chunk.first_ray];
+      result.lookups_squared[ray] += part.lookups_squared[ray - chunk.first_ray];
     }
     for (std::size_t c = 0; c < channels; ++c) {
       result.groups[c] += part.groups[c];
-      if (cell.samples_per_ray <= whole_chunk) continue;
+      if (span.per_ray <= whole_chunk) continue;
       if (chunk.first == 0) across[c].finish_ray();
       if (chunk.count == whole_chunk) across[c].carry(static_cast<std::size_t>(level), part.group_sums[c]);
     }
     result.counters += part.counters;
     result.nonfinite += part.nonfinite;
+    result.out_of_range += part.out_of_range;
+    for (const auto& [test, evidence] : part.evidence) result.evidence[test] += evidence;
   }
-  if (cell.samples_per_ray > whole_chunk) {
+  if (span.per_ray > whole_chunk) {
     // A chunk's own groups already hold the level at which the chunks begin.
     for (std::size_t c = 0; c < channels; ++c) result.groups[c].append_above(static_cast<std::size_t>(level), across[c]);
   }
@@ -229,26 +337,72 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<con
 
   std::vector<CellTheory> result(count);
   const auto n = static_cast<Real>(rays);
+  const auto finite = [](const std::optional<Real>& x) { return x && std::isfinite(*x); };
   for (std::size_t k = 0; k < count; ++k) {
     CellTheory& cell = result[k];
+    bool all_variances = true, all_lookups = true, all_spreads = true;
+    cell.ray_expected.resize(rays * channels);
+    cell.ray_shift.resize(rays * channels);
+    cell.ray_variance.resize(rays * channels);
+    cell.ray_lookups.resize(rays);
+    cell.ray_lookups_variance.resize(rays);
     for (std::size_t c = 0; c < channels; ++c) {
-      std::optional<Real> variance = 0, bias = 0, squared = 0, lookups = 0;
+      Real variance = 0, bias = 0, squared = 0, lookups = 0;
+      bool known = true;
       for (std::size_t ray = 0; ray < rays; ++ray) {
         const auto& [theory, expected] = all[(ray * count + k) * channels + c];
         const Real gap = theory.mean ? *theory.mean - expected : 0;
-        variance = variance && theory.variance && std::isfinite(*theory.variance) ? std::optional(*variance + *theory.variance)
-                                                                                  : std::nullopt;
-        bias = *bias + gap;
-        squared = *squared + gap * gap;
-        lookups = lookups && theory.lookups ? std::optional(*lookups + *theory.lookups) : std::nullopt;
+        cell.ray_expected[ray * channels + c] = expected;
+        cell.ray_shift[ray * channels + c] = gap;
+        cell.ray_variance[ray * channels + c] = theory.variance.value_or(0);
+        known = known && finite(theory.variance);
+        variance += theory.variance.value_or(0);
+        bias += gap;
+        squared += gap * gap;
+        if (c > 0) continue;
+        all_lookups = all_lookups && finite(theory.lookups);
+        all_spreads = all_spreads && finite(theory.lookups_variance);
+        lookups += cell.ray_lookups[ray] = theory.lookups.value_or(0);
+        cell.ray_lookups_variance[ray] = theory.lookups_variance.value_or(0);
       }
-      cell.variance.push_back(variance ? std::optional(*variance / n) : std::nullopt);
-      cell.bias.push_back(variance ? std::optional(*bias / n) : std::nullopt);
-      cell.squared_bias.push_back(variance ? std::optional(*squared / n) : std::nullopt);
-      if (c == 0 && lookups) cell.lookups = *lookups / n;
+      all_variances = all_variances && known;
+      const auto where_known = [&](Real x) { return known ? std::optional(x / n) : std::nullopt; };
+      cell.variance.push_back(where_known(variance));
+      cell.bias.push_back(where_known(bias));
+      cell.squared_bias.push_back(where_known(squared));
+      if (c == 0 && all_lookups) cell.lookups = lookups / n;
     }
+    if (!all_variances) cell.ray_variance.clear();
+    if (!all_lookups) cell.ray_lookups.clear();
+    if (!all_spreads) cell.ray_lookups_variance.clear();
   }
   return result;
+}
+
+std::vector<Real> expected_of(const Scene& scene, const Kernel& kernel, Quantity quantity) {
+  const std::size_t rays = scene.rays->local.size();
+  const auto channels = static_cast<std::size_t>(scene.reference->channels);
+  std::vector<Real> result(rays * channels);
+  const auto workspace = kernel.workspace();
+  RayContext context;
+  for (std::size_t ray = 0; ray < rays; ++ray) {
+    scene.context(ray, kernel, context);
+    kernel.begin_ray(*workspace, *scene.medium->medium, scene.medium->extrema, context);
+    const Spectrum expected = kernel.expected(*workspace, scene.reference->at(ray), quantity);
+    for (std::size_t c = 0; c < channels; ++c) result[ray * channels + c] = expected[static_cast<Eigen::Index>(c)];
+  }
+  return result;
+}
+
+bool bounds_everywhere(const Scene& scene, const Kernel& kernel) {
+  constexpr Real kSlack = 1e-9;
+  RayContext context;
+  for (std::size_t ray = 0; ray < scene.rays->local.size(); ++ray) {
+    scene.context(ray, kernel, context);
+    for (const Segment& segment : context.segments.segments)
+      if (segment.extinction.maximum.maxCoeff() > segment.majorant * (1 + kSlack)) return false;
+  }
+  return true;
 }
 
 }  // namespace nullmark

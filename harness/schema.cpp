@@ -106,6 +106,12 @@ Json definitions() {
   }
   cell["images"] = {{"type", "boolean"}, {"default", false}};
   cell["image_maximum"] = described(positive(), "value shown white");
+  cell["gate"] = described(
+      closed_object({{"enabled", {{"type", "boolean"}, {"default", true}}},
+                     {"epsilon", described(positive(), "|bias| that PASS excludes, relative to the mean reference")},
+                     {"max_samples_per_ray", described(whole(0), "drawn while the verdict is open; 0: only samples_per_ray")},
+                     {"max_lookups_per_ray", described(positive(), "expected lookups that all samples of a ray may cost")}}),
+      "what the verdict must prove and may cost");
   cell["own_streams"] = described({{"type", "boolean"}, {"default", false}},
                                   "random streams keyed by the estimator too, instead of common random numbers");
   Json experiment = cell;
@@ -200,6 +206,8 @@ Json cell_schema() {
        {"majorant_violations", whole(0)},
        {"largest_violation", described(nullable("number"), "extinction over majorant, where above 1")},
        {"nonfinite", whole(0)},
+       {"verdict",
+        {{"type", {"object", "null"}}, {"description", "evidence for and against the claims; see harness/verdict.md"}}},
        {"time", {{"type", {"object", "null"}}, {"description", "nanoseconds unless the key says otherwise"}}},
        {"efficiency", object_schema({{"variance_x_lookups", statistic("lower is better")}}, {"variance_x_lookups"})},
        {"convergence", list_of(object_schema({{"samples", whole(1)},
@@ -257,6 +265,8 @@ Json config_schema() {
              {"repetitions", {{"type", "integer"}, {"minimum", 1}, {"maximum", 10'000}, {"default", TimingPlan{}.repetitions}}},
              {"seconds", described(positive(), "least time of one repetition")},
              {"samples_per_traversal", described(whole(1), "samples that share one walk through the majorant structure")}})},
+       {"verdict", closed_object({{"alpha", described(positive(), "chance of even one false FAIL in the whole configuration")},
+                                  {"alpha_pass", described(positive(), "chance of a false PASS, of each test")}})},
        {"experiments", list_of(reference("experiment"), 1)},
        {"tables", list_of(reference("table"))}},
       {"$schema", "experiments"}));

@@ -56,6 +56,13 @@ Json measurement_json(const Measurement& measurement) {
   return {{"clamp", measurement.clamp}, {"quantise_bits", measurement.quantise_bits}};
 }
 
+Json gate_json(const GateSpec& gate) {
+  Json json = {{"enabled", gate.enabled}, {"max_samples_per_ray", gate.max_samples_per_ray}};
+  if (gate.epsilon) json["epsilon"] = *gate.epsilon;
+  if (gate.max_lookups_per_ray) json["max_lookups_per_ray"] = *gate.max_lookups_per_ray;
+  return json;
+}
+
 Json tables_json(const std::vector<Table>& tables) {
   Json list = Json::array();
   for (const Table& table : tables) {
@@ -84,6 +91,7 @@ std::string applied_config(const Plan& plan) {
     if (plan.media[cell.medium].optional) entry["medium"]["optional"] = true;
     entry["images"] = cell.images;
     entry["image_maximum"] = cell.image_maximum;
+    entry["gate"] = gate_json(cell.gate);
     experiments.back()["include"].push_back(std::move(entry));
   }
   const Json json = {{"$schema", kConfigSchema},
@@ -93,6 +101,7 @@ std::string applied_config(const Plan& plan) {
                        {"repetitions", plan.timing.repetitions},
                        {"seconds", plan.timing.seconds},
                        {"samples_per_traversal", plan.timing.samples_per_traversal}}},
+                     {"verdict", {{"alpha", plan.levels.alpha}, {"alpha_pass", plan.levels.alpha_pass}}},
                      {"experiments", std::move(experiments)},
                      {"tables", tables_json(plan.tables)}};
   return json.dump();

@@ -8,6 +8,7 @@
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/results_json.h"
+#include "harness/verdict_json.h"
 
 namespace nullmark {
 namespace {
@@ -37,6 +38,16 @@ std::string shown(const ChannelRecord& channel, const std::optional<Real>& value
   return heavy_tailed(channel) && theory ? short_number(theory) + "*" : short_number(value);
 }
 
+/// What was proven: of the mean, and of the lookups where that is not a PASS.
+std::string verdict_word(const CellRecord& record) {
+  if (!record.verdict) return "-";
+  const VerdictRecord& verdict = *record.verdict;
+  std::string word = to_string(verdict.unbiased);
+  if (verdict.against == "own mean") word = fmt::format("own mean {}", to_string(verdict.own_mean));
+  if (verdict.lookups == Outcome::fail) word += ", lookups FAIL";
+  return word.empty() ? "-" : word;
+}
+
 Line channel_line(const CellRecord& record, std::size_t c) {
   const ChannelRecord& channel = record.channel[c];
   const bool first = c == 0;
@@ -51,6 +62,7 @@ Line channel_line(const CellRecord& record, std::size_t c) {
           once(metric(record, "ns_per_lookup")),
           once(record.time ? std::optional(record.time->floor_ratio) : std::nullopt),
           short_number(variance_x_ns(record, c)),
+          first ? verdict_word(record) : "",
           first ? to_string(record.status) + (record.reason.empty() ? "" : ": " + record.reason) : ""};
 }
 
@@ -153,7 +165,7 @@ std::string results_tables(const RunRecord& run) {
   bool marked = false;
   for (const auto& [title, records] : grouped(run.cells, heading)) {
     std::vector<Line> lines = {{"estimator", "rmse", "bias", "variance", "variance theory", "lookups", "lookups theory",
-                                "ns/lookup", "floor ratio", "variance x ns", "status"}};
+                                "ns/lookup", "floor ratio", "variance x ns", "verdict", "status"}};
     for (const CellRecord* record : records) {
       append_lines(*record, lines);
       for (const ChannelRecord& channel : record->channel) marked |= heavy_tailed(channel) && channel.variance_theory;

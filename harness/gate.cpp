@@ -1,0 +1,347 @@
+#include "harness/gate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "harness/sampling.h"
+
+namespace nullmark {
+namespace {
+
+constexpr Real kUnknown = std::numeric_limits<Real>::quiet_NaN();
+
+/// Rates of the bets, as multiples of epsilon/variance: a mixture over them stands in for the rate that hindsight would pick.
+constexpr Real kFailRates[] = {0.25, 0.5, 1, 2}, kPassRates[] = {0.35, 0.7, 1};
+
+/// Catoni's variance bound over the known variance: quadrature slack, and what PASS concedes ("given Var <= 1.25 sigma^2").
+constexpr Real kFailSlack = 1.02, kPassSlack = 1.25, kPilotSlack = 2;
+
+/// A pilot variance is trusted for unbounded samples only below this variance of the variance.
+constexpr Real kTrustedVariance = 0.02;
+
+/// Margin of the groups over that of all rays: as many standard errors as in the pooled test.
+const Real kGroupMargin = std::sqrt(static_cast<Real>(kRayGroups));
+
+/// The relative margin where the configuration names none, wider where depth makes samples noisier.
+Real default_epsilon(Real transmittance) {
+  if (transmittance > std::exp(-2.)) return 0.01;
+  if (transmittance > std::exp(-5.)) return 0.02;
+  return transmittance > 1e-4 ? 0.05 : 0.5;
+}
+
+/// Absolute margin of a channel.  Where hardly anything is absorbed it shrinks with 1 - T, or a tracker that sees no medium at
+/// all would pass.
+Real absolute_epsilon(const Cell& cell, Real mean) {
+  if (cell.gate.epsilon) return *cell.gate.epsilon * mean;
+  if (cell.quantity == Quantity::optical_depth) return 0.01 * mean;
+  constexpr Real kOfAbsorbed = 0.1;
+  const Real margin = default_epsilon(mean) * mean, absorbed = 1 - mean;
+  return absorbed > 1e-12 ? std::min(margin, kOfAbsorbed * absorbed) : margin;
+}
+
+/// What the rays of one test have in common.
+struct Pool {
+  Real mean = 0, variance = 0, reference_error = 0, least = kInfinity, most = -kInfinity;
+  std::size_t rays = 0;
+};
+
+void set_bets(MeanTest& test, const Pool& pool, Real low, Real high, bool analytic, int& errors_per_sum) {
+  const bool bounded_below = std::isfinite(low), bounded_above = std::isfinite(high);
+  const Real below = pool.most - low, above = high - pool.least;  // the largest errors down and up
+  const Real slack = analytic ? 1 : kPilotSlack;
+  const auto place = [&](Role role, Bet::Kind kind, int side, Real limit) {
+    Bet bet{kind, side, limit, 0, {}};
+    bet.variance = test.variance * (analytic ? (role == Role::fail ? kFailSlack : kPassSlack) : slack);
+    const Real scale = test.epsilon / (test.variance * slack);
+    if (role == Role::fail)
+      for (const Real rate : kFailRates) bet.rates.push_back(rate * scale);
+    else
+      for (const Real rate : kPassRates) bet.rates.push_back(rate * scale);
+    test.bets.emplace_back(role, std::move(bet));
+  };
+  using Kind = Bet::Kind;
+  if (!bounded_below || !bounded_above) {
+    place(Role::fail, Kind::catoni, 1, test.reference_error);
+    place(Role::fail, Kind::catoni, -1, -test.reference_error);
+  }
+  if (bounded_below) place(Role::fail, Kind::betting, 1, test.reference_error);
+  if (bounded_above) place(Role::fail, Kind::betting, -1, -test.reference_error);
+  place(Role::low, bounded_below ? Kind::betting : Kind::catoni, 1, -test.epsilon);
+  place(Role::high, bounded_above ? Kind::betting : Kind::catoni, -1, test.epsilon);
+  test.basis = bounded_below && bounded_above ? "betting" : bounded_below || bounded_above ? "catoni+betting" : "catoni";
+
+  // Sums may be as long as a bet at its highest rate still resembles the product over single errors.
+  constexpr Real kSmall = 0.25;
+  for (const auto& [role, bet] : test.bets) {
+    const Real rate = bet.rates.back();
+    const auto fits = [&](int b) {
+      if (bet.kind == Kind::catoni) return b * rate * rate * bet.variance <= kSmall * kSmall;
+      const Real widest = std::max(bounded_below ? below : 0, bounded_above ? above : 0) + std::abs(bet.limit);
+      return b * rate * widest <= kSmall;
+    };
+    while (errors_per_sum > 1 && !fits(errors_per_sum)) errors_per_sum /= 2;
+  }
+}
+
+/// Keeps the wealth of betting bets positive.
+void clip_rates(MeanTest& test, const Pool& pool, Real low, Real high, int errors_per_sum) {
+  for (auto& [role, bet] : test.bets) {
+    if (bet.kind != Bet::Kind::betting) continue;
+    const Real loss = bet.side > 0 ? pool.most - low + bet.limit : high - pool.least - bet.limit;
+    const Real most = loss > 0 ? 0.5 / (loss * errors_per_sum) : kInfinity;
+    for (Real& rate : bet.rates) rate = std::min(rate, most);
+  }
+}
+
+/// Samples (over all rays of the test) at which an unbiased cell passes with probability about .95.
+Real samples_to_pass(const MeanTest& test, Real alpha_pass) {
+  constexpr Real kPower = 1.645;
+  const Real margin = test.epsilon - test.reference_error;
+  if (!(margin > 0)) return kInfinity;
+  const Real normal = std::sqrt(2 * std::log(1 / alpha_pass)) + kPower;
+  Real samples = normal * normal * test.variance / (margin * margin);
+  for (const auto& [role, bet] : test.bets) {
+    if (role == Role::fail) continue;
+    const Real v = bet.kind == Bet::Kind::catoni ? bet.variance : test.variance;
+    Real growth = 0;
+    for (const Real l : bet.rates) growth = std::max(growth, l * margin - l * l * v / 2);
+    constexpr Real kSpread = 1.6;  // between the expected wealth and that of 95 of 100 runs
+    samples = std::max(samples, kSpread * std::log(static_cast<Real>(bet.rates.size()) / alpha_pass) / growth);
+  }
+  return samples;
+}
+
+std::uint64_t per_ray(Real samples, std::size_t rays) {
+  const Real each = std::ceil(samples / static_cast<Real>(rays));
+  return each < 9e15 ? static_cast<std::uint64_t>(each) : std::uint64_t{1} << 53;
+}
+
+std::uint64_t largest_power_of_two_divisor(std::uint64_t n) { return n & (~n + 1); }
+
+/// Upper bound on the number of ray groups, from the specification alone.
+std::uint64_t possible_groups(const Component& rays) { return rays.type == "single" ? 0 : kRayGroups; }
+
+std::uint64_t channels_of(const MediumSpec& medium) {
+  if (!medium.per_channel.empty()) return medium.per_channel.size();
+  return std::max<std::size_t>(1, medium.spectrum.size());
+}
+
+}  // namespace
+
+std::vector<int> ray_groups(const BuiltRays& rays) {
+  const std::size_t n = rays.world.size();
+  std::vector<int> groups(n, 0);
+  if (n < static_cast<std::size_t>(kRayGroups)) return groups;
+  constexpr int kTiles = 4;
+  static_assert(kTiles * kTiles == kRayGroups);
+  const bool tiles = rays.width >= kTiles && rays.height >= kTiles;
+  for (std::size_t r = 0; r < n; ++r) {
+    if (tiles) {
+      const auto width = static_cast<std::size_t>(rays.width), height = static_cast<std::size_t>(rays.height);
+      groups[r] = static_cast<int>((r / width) * kTiles / height * kTiles + (r % width) * kTiles / width);
+    } else {
+      groups[r] = static_cast<int>(r * kRayGroups / n);
+    }
+  }
+  return groups;
+}
+
+void Evidence::add(const MeanTest& test, std::span<const Real> errors, int errors_per_sum) {
+  std::size_t at = 0;
+  for (const auto& [role, bet] : test.bets) {
+    const std::vector<Real> added = bet_on(bet, errors, errors_per_sum);
+    logs.resize(std::max(logs.size(), at + added.size()), 0);
+    for (const Real x : added) logs[at++] += x;
+  }
+  sums += errors.size();
+}
+
+Evidence& Evidence::operator+=(const Evidence& other) {
+  logs.resize(std::max(logs.size(), other.logs.size()), 0);
+  for (std::size_t i = 0; i < other.logs.size(); ++i) logs[i] += other.logs[i];
+  sums += other.sums;
+  largest_error = std::max(largest_error, other.largest_error);
+  return *this;
+}
+
+CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Claim claim, bool bounding, const CellTheory& theory,
+                   const std::optional<Pilot>& pilot, const GateLevels& levels) {
+  const std::size_t rays = scene.rays->world.size();
+  const auto channels = static_cast<std::size_t>(scene.reference->channels);
+  CellGate gate;
+  const bool own_mean = claim == Claim::consistent || claim == Claim::biased;
+  gate.against = own_mean ? "own mean" : "reference";
+  gate.group_of = ray_groups(*scene.rays);
+  const int groups = rays < static_cast<std::size_t>(kRayGroups) ? 0 : kRayGroups;
+
+  if (cell.quantity == Quantity::optical_depth || (!bounding && range != SampleRange::binary)) range = SampleRange::any_sign;
+  if (range != SampleRange::any_sign) gate.low = 0;
+  if (range == SampleRange::binary || range == SampleRange::unit) gate.high = 1;
+
+  const bool analytic = !theory.ray_variance.empty();
+  gate.variance_basis = analytic ? "analytic" : pilot ? "pilot" : "none";
+  gate.shift.assign(rays * channels, 0);
+  if (own_mean && !theory.ray_shift.empty()) gate.shift = theory.ray_shift;
+  if (!analytic && !pilot) return gate;
+
+  gate.errors_per_sum = gate.lookups_per_sum =
+      static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
+  std::vector<Pool> pools;
+  constexpr Real kUlp = std::numeric_limits<Real>::epsilon();
+  const Real mean_lookups = theory.lookups.value_or(0);
+  for (std::size_t c = 0; c < channels; ++c) {
+    std::vector<Pool> by_group(static_cast<std::size_t>(groups) + 1);
+    for (std::size_t ray = 0; ray < rays; ++ray) {
+      const std::size_t at = ray * channels + c;
+      const Real mean = theory.ray_expected[at] + gate.shift[at];
+      const Real depth_error = scene.reference->error[at];
+      for (Pool* pool : {&by_group[0], groups ? &by_group[static_cast<std::size_t>(gate.group_of[ray]) + 1] : nullptr}) {
+        if (!pool) continue;
+        ++pool->rays;
+        pool->mean += mean;
+        pool->variance += analytic ? theory.ray_variance[at] : pilot->variance[at];
+        pool->reference_error += cell.quantity == Quantity::transmittance ? mean * depth_error : depth_error;
+        pool->least = std::min(pool->least, mean);
+        pool->most = std::max(pool->most, mean);
+      }
+    }
+    Real epsilon = 0;
+    for (std::size_t g = 0; g < by_group.size(); ++g) {
+      Pool& pool = by_group[g];
+      const auto n = static_cast<Real>(pool.rays);
+      pool.mean /= n;
+      if (g == 0) epsilon = absolute_epsilon(cell, pool.mean);
+      MeanTest test;
+      test.channel = static_cast<int>(c);
+      test.group = static_cast<int>(g) - 1;
+      test.rays = pool.rays;
+      test.epsilon = g == 0 ? epsilon : epsilon * kGroupMargin;
+      test.reference_error = pool.reference_error / n;
+      test.variance = pool.variance / n;
+      const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0;
+      test.rounding = 64 * kUlp * (1 + mean_lookups + depth) * std::max(std::abs(pool.most), std::abs(pool.least));
+      test.deterministic = !(test.variance > test.rounding * test.rounding);
+      pools.push_back(pool);
+      if (test.deterministic)
+        test.basis = "deterministic";
+      else
+        set_bets(test, pool, gate.low, gate.high, analytic, gate.errors_per_sum);
+      gate.tests.push_back(std::move(test));
+    }
+  }
+  const std::uint64_t most = std::max(cell.samples_per_ray, cell.gate.max_samples_per_ray);
+  gate.affordable = most;
+  if (cell.gate.max_lookups_per_ray && mean_lookups > 0)
+    gate.affordable = std::min(most, static_cast<std::uint64_t>(std::min(9e15, *cell.gate.max_lookups_per_ray / mean_lookups)));
+  gate.affordable = std::max(gate.affordable, cell.samples_per_ray);
+
+  for (std::size_t i = 0; i < gate.tests.size(); ++i) {
+    MeanTest& test = gate.tests[i];
+    if (test.deterministic) continue;
+    clip_rates(test, pools[i], gate.low, gate.high, gate.errors_per_sum);
+    test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), test.rays);
+    gate.planned = std::max(gate.planned, test.planned);
+    const Real mean = std::abs(pools[i].mean);
+    if (test.reference_error > 0.25 * test.epsilon)
+      gate.undecidable =
+          fmt::format("the reference's own error {:.2g} is too coarse for epsilon {:.2g}", test.reference_error, test.epsilon);
+    else if (test.planned > gate.affordable && gate.undecidable.empty())
+      gate.undecidable =
+          fmt::format("PASS at epsilon {:.2g} needs about {:.2g} samples a ray (relative variance {:.2g}); {} are allowed",
+                      test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean), gate.affordable);
+  }
+  if (!analytic && gate.undecidable.empty() && pilot->variance_of_variance >= kTrustedVariance &&
+      !(std::isfinite(gate.low) && std::isfinite(gate.high)))
+    gate.undecidable = fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
+                                   pilot->variance_of_variance);
+
+  // The same machinery for what a sample costs.
+  const bool known_cost = !theory.ray_lookups.empty();
+  const bool known_spread = !theory.ray_lookups_variance.empty();
+  if (known_cost && (known_spread || pilot)) {
+    gate.lookups = theory.ray_lookups;
+    Pool pool;
+    for (std::size_t ray = 0; ray < rays; ++ray) {
+      ++pool.rays;
+      pool.mean += theory.ray_lookups[ray];
+      pool.variance += known_spread ? theory.ray_lookups_variance[ray] : pilot->lookups_variance[ray];
+      pool.least = std::min(pool.least, theory.ray_lookups[ray]);
+      pool.most = std::max(pool.most, theory.ray_lookups[ray]);
+    }
+    const auto n = static_cast<Real>(rays);
+    MeanTest test;
+    test.channel = MeanTest::kLookups;
+    test.rays = rays;
+    constexpr Real kCostEpsilon = 0.01;
+    // Expected lookups come from a quadrature as well.
+    constexpr Real kTheoryError = 1e-6;
+    test.epsilon = kCostEpsilon * pool.mean / n;
+    test.reference_error = kTheoryError * pool.mean / n;
+    test.variance = pool.variance / n;
+    test.rounding = test.reference_error;
+    test.deterministic = !(test.variance > test.rounding * test.rounding);
+    if (test.deterministic) {
+      test.basis = "deterministic";
+    } else {
+      set_bets(test, pool, 0, kInfinity, known_spread, gate.lookups_per_sum);
+      clip_rates(test, pool, 0, kInfinity, gate.lookups_per_sum);
+      test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), rays);
+    }
+    gate.tests.push_back(std::move(test));
+  }
+  return gate;
+}
+
+TestRecord test_record(const MeanTest& test, const Evidence& evidence, int errors_per_sum) {
+  TestRecord record;
+  record.channel = test.channel;
+  record.group = test.group;
+  record.samples = evidence.sums * static_cast<std::uint64_t>(errors_per_sum);
+  record.epsilon = test.epsilon;
+  record.reference_error = test.reference_error;
+  record.variance = test.variance;
+  record.basis = test.basis;
+  record.largest_error = evidence.largest_error;
+  record.rounding = test.rounding;
+  record.planned = test.planned;
+  if (test.deterministic) return record;
+
+  // By role and kind: kinds weigh the same, however many rates each has.
+  std::map<std::pair<Role, Bet::Kind>, std::vector<Real>> wealth;
+  std::size_t at = 0;
+  for (const auto& [role, bet] : test.bets)
+    for (const Real rate : bet.rates) {
+      const Real log = at < evidence.logs.size() ? evidence.logs[at] : 0;
+      wealth[{role, bet.kind}].push_back(log - log_denominator(bet, rate, evidence.sums, errors_per_sum));
+      ++at;
+    }
+  const auto log_e = [&](Role role) {
+    std::vector<Real> kinds;
+    for (const auto& [key, logs] : wealth)
+      if (key.first == role) kinds.push_back(log_mean_exp(logs));
+    return log_mean_exp(kinds);
+  };
+  record.log_e_fail = log_e(Role::fail);
+  record.log_e_low = log_e(Role::low);
+  record.log_e_high = log_e(Role::high);
+  record.rates = test.bets.front().second.rates;
+  return record;
+}
+
+std::uint64_t mean_family(const Plan& plan) {
+  std::uint64_t tests = 0;
+  for (const Cell& cell : plan.cells)
+    if (cell.gate.enabled) tests += channels_of(plan.media[cell.medium]) * (1 + possible_groups(plan.ray_sets[cell.rays]));
+  return std::max<std::uint64_t>(1, tests);
+}
+
+std::uint64_t lookups_family(const Plan& plan) {
+  std::uint64_t tests = 0;
+  for (const Cell& cell : plan.cells) tests += cell.gate.enabled;
+  return std::max<std::uint64_t>(1, tests);
+}
+
+}  // namespace nullmark

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/evidence.h"
+#include "harness/plan.h"
+#include "harness/record.h"
+#include "harness/scene.h"
+
+namespace nullmark {
+
+struct CellTheory;
+
+/// Groups that rays are judged in beside all of them together, since pooled biases cancel: tiles of an image, or runs of a list.
+inline constexpr int kRayGroups = 16;
+
+/// The group of each ray; all 0 where there are too few rays for groups.
+std::vector<int> ray_groups(const BuiltRays& rays);
+
+/// Which of a test's claims a bet is against: "the mean error is 0" (two bets, one a side), "at most -epsilon", "at least
+/// epsilon".
+enum class Role { fail, low, high };
+
+/// One test of a cell: the mean error of a channel over all rays or over one group, or the mean lookups.  Decided before the
+/// first sample is drawn.
+struct MeanTest {
+  static constexpr int kAllRays = -1, kLookups = -1;
+  int channel = 0;  ///< kLookups: lookups against their expectation
+  int group = kAllRays;
+  std::size_t rays = 0;        ///< that take part
+  Real epsilon = 0;            ///< absolute margin of PASS
+  Real reference_error = 0;    ///< absolute, of the reference
+  Real variance = 0;           ///< per sample, averaged over the rays, as theory or a pilot has it
+  Real rounding = 0;           ///< errors up to here are rounding
+  bool deterministic = false;  ///< no variance beyond rounding: every single sample must be right
+  std::string basis;           ///< "betting", "catoni", "catoni+betting" or "deterministic"
+  std::uint64_t planned = 0;   ///< samples per ray at which PASS is all but certain where there is no bias
+  std::vector<std::pair<Role, Bet>> bets;
+};
+
+/// What a cell's samples are judged by.
+struct CellGate {
+  std::vector<MeanTest> tests;
+  std::vector<int> group_of;  ///< per ray
+  std::vector<Real>
+      shift;  ///< [ray * channels + c], the claimed mean minus the reference, for estimators judged by their own mean
+  std::vector<Real> lookups;  ///< per ray, expected; empty where unknown
+  int errors_per_sum = 1, lookups_per_sum = 1;
+  Real low = -kInfinity, high = kInfinity;  ///< the declared range of samples
+  std::string against;                      ///< "reference" or "own mean"
+  std::string variance_basis;               ///< "analytic", "pilot" or "none"
+  std::uint64_t planned = 0;                ///< samples per ray, of the most demanding test
+  std::uint64_t affordable = 0;             ///< samples per ray that the configuration allows
+  std::string undecidable;                  ///< why no affordable number of samples decides the mean; empty where one does
+};
+
+/// Evidence of one test so far.
+struct Evidence {
+  std::vector<Real> logs;  ///< bet after bet, rate after rate
+  std::uint64_t sums = 0;
+  Real largest_error = 0;
+
+  void add(const MeanTest& test, std::span<const Real> errors, int errors_per_sum);
+  Evidence& operator+=(const Evidence& other);
+};
+
+/// Variance per ray and channel from a pilot run, where theory has none.
+struct Pilot {
+  std::vector<Real> variance;          ///< [ray * channels + c]
+  std::vector<Real> lookups_variance;  ///< per ray
+  Real variance_of_variance = 0;       ///< largest over channels of sum d^4/(sum d^2)^2 - 1/n
+};
+
+/// Plans the tests of a cell.  Needs the majorant to be true where `bounding`; without that, ranges that rest on it are not
+/// claimed. `pilot` serves where theory has no variance.
+CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Claim claim, bool bounding, const CellTheory& theory,
+                   const std::optional<Pilot>& pilot, const GateLevels& levels);
+
+/// The figures of a test, ready for the record.
+TestRecord test_record(const MeanTest& test, const Evidence& evidence, int errors_per_sum);
+
+/// Mean tests of a whole configuration, channel by channel and group by group, whatever is selected to run; and lookups tests.
+std::uint64_t mean_family(const Plan& plan);
+std::uint64_t lookups_family(const Plan& plan);
+
+}  // namespace nullmark

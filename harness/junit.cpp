@@ -1,0 +1,94 @@
+#include "harness/junit.h"
+
+#include <fmt/format.h>
+
+#include <string_view>
+
+#include "harness/results_json.h"
+#include "harness/verdict_json.h"
+
+namespace nullmark {
+namespace {
+
+std::string xml(const std::string& text) {
+  std::string result;
+  for (const char c : text) switch (c) {
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      // XML has no way to write control characters.
+      default:
+        result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+  return result;
+}
+
+std::string shell_quoted(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) result += c == '\'' ? "'\\''" : std::string(1, c);
+  return result + "'";
+}
+
+/// How a cell ended: element name ("" for a pass) and message.
+struct Ending {
+  const char* element = "";
+  std::string message;
+};
+
+Ending ending(const CellRecord& record) {
+  if (record.status == Status::error) return {"error", record.reason};
+  if (record.status != Status::ok) return {"skipped", record.reason.empty() ? to_string(record.status) : record.reason};
+  if (!record.verdict) return {};
+  const VerdictRecord& verdict = *record.verdict;
+  if (verdict.unbiased == Outcome::fail || verdict.own_mean == Outcome::fail) return {"failure", "FAIL: " + verdict.reason};
+  if (verdict.lookups == Outcome::fail) return {"failure", "FAIL: lookups differ from their expectation"};
+  if (verdict.unbiased == Outcome::inconclusive || verdict.own_mean == Outcome::inconclusive)
+    return {"skipped", "INCONCLUSIVE: " + verdict.reason};
+  if (verdict.unbiased == Outcome::violated) return {"skipped", "VIOLATED: " + verdict.reason};
+  return {};
+}
+
+}  // namespace
+
+std::string reproduction(const CellRecord& record, const std::string& file) {
+  std::string pattern;
+  for (const char c : record.cell.name) {
+    if (std::string_view("\\^$.|?*+()[]{}").find(c) != std::string_view::npos) pattern += '\\';
+    pattern += c;
+  }
+  return fmt::format("jq .config {} | nullmark run - -o - --filter {}", shell_quoted(file), shell_quoted("^" + pattern + "$"));
+}
+
+std::string junit(const RunRecord& run, const std::string& file) {
+  std::string cases;
+  std::size_t failures = 0, errors = 0, skipped = 0;
+  for (const CellRecord& record : run.cells) {
+    const Ending end = ending(record);
+    const std::string_view element = end.element;
+    cases += fmt::format("    <testcase classname=\"{}\" name=\"{}\"", xml(record.cell.experiment), xml(record.cell.name));
+    if (element.empty()) {
+      cases += "/>\n";
+      continue;
+    }
+    ++(element == "failure" ? failures : element == "error" ? errors : skipped);
+    cases += fmt::format(">\n      <{0} message=\"{1}\">{2}</{0}>\n    </testcase>\n", element, xml(end.message),
+                         xml(reproduction(record, file)));
+  }
+  const std::string counts =
+      fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\"", run.cells.size(), failures, errors, skipped);
+  return fmt::format(
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites {0}>\n  <testsuite name=\"{1}\" {0}>\n{2}  "
+      "</testsuite>\n</testsuites>\n",
+      counts, xml(run.name), cases);
+}
+
+}  // namespace nullmark

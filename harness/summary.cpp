@@ -1,0 +1,176 @@
+#include "harness/summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "harness/junit.h"
+#include "harness/results_json.h"
+#include "harness/verdict.h"
+#include "harness/verdict_json.h"
+
+namespace nullmark {
+namespace {
+
+/// What a cell amounts to, as one word.
+enum class Kind { pass, fail, expected_open, unexpected_open, violated, error, not_run, unclaimed };
+
+Kind kind_of(const CellRecord& record) {
+  if (record.status == Status::error) return Kind::error;
+  if (record.status != Status::ok) return Kind::not_run;
+  if (!record.verdict) return Kind::unclaimed;
+  const VerdictRecord& verdict = *record.verdict;
+  const Outcome mean = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
+  if (mean == Outcome::fail || verdict.lookups == Outcome::fail) return Kind::fail;
+  if (mean == Outcome::violated) return Kind::violated;
+  if (mean == Outcome::inconclusive) return verdict.planned_undecidable ? Kind::expected_open : Kind::unexpected_open;
+  return mean == Outcome::pass ? Kind::pass : Kind::unclaimed;
+}
+
+const char* word(Kind kind) {
+  switch (kind) {
+    case Kind::pass:
+      return "PASS";
+    case Kind::fail:
+      return "FAIL";
+    case Kind::expected_open:
+      return "INCONCLUSIVE (as planned)";
+    case Kind::unexpected_open:
+      return "INCONCLUSIVE";
+    case Kind::violated:
+      return "VIOLATED";
+    case Kind::error:
+      return "ERROR";
+    case Kind::not_run:
+      return "not run";
+    case Kind::unclaimed:
+      break;
+  }
+  return "nothing claimed";
+}
+
+std::string reason_of(const CellRecord& record) {
+  if (record.status != Status::ok) return record.reason;
+  if (!record.verdict) return "";
+  const VerdictRecord& verdict = *record.verdict;
+  std::string reason = verdict.reason;
+  if (verdict.lookups == Outcome::fail) {
+    for (const TestRecord& test : verdict.tests)
+      if (test.channel < 0)
+        reason +=
+            fmt::format("{}lookups differ from their expectation (log E = {:.1f})", reason.empty() ? "" : "; ", test.log_e_fail);
+  }
+  return reason;
+}
+
+std::string counts(const Summary& s) {
+  return fmt::format(
+      "{} PASS, {} FAIL, {} INCONCLUSIVE as planned, {} INCONCLUSIVE, {} VIOLATED, {} errors, {} not run, {} claim nothing",
+      s.pass, s.fail, s.expected_open, s.unexpected_open, s.violated, s.errors, s.not_run, s.unclaimed);
+}
+
+std::string order_line(const OrderFit& fit) {
+  if (fit.steps.size() < 3) return fmt::format("{}: claimed order {:.0f}, {}", fit.name, fit.claimed, fit.reason);
+  return fmt::format("{}: claimed order {:.0f}, measured {:.3f} +- {:.3f}: {}", fit.name, fit.claimed, fit.order, fit.half_width,
+                     fit.outcome == Outcome::inconclusive ? fit.reason : to_string(fit.outcome));
+}
+
+std::string families(const RunRecord& run) {
+  for (const CellRecord& record : run.cells)
+    if (record.verdict)
+      return fmt::format(
+          "at most {:g} of all runs show even one false FAIL among {} mean tests (and the same among {} of lookups)",
+          record.verdict->alpha, record.verdict->family, record.verdict->lookups_family);
+  return "no cell was judged";
+}
+
+}  // namespace
+
+Summary summarise(RunRecord& run) {
+  Summary summary;
+  for (CellRecord& record : run.cells) {
+    if (record.verdict && record.status == Status::ok) {
+      const VerdictRecord before = *record.verdict;
+      decide(*record.verdict);
+      const VerdictRecord& after = *record.verdict;
+      summary.altered +=
+          before.unbiased != after.unbiased || before.own_mean != after.own_mean || before.lookups != after.lookups;
+    }
+    switch (kind_of(record)) {
+      case Kind::pass:
+        ++summary.pass;
+        break;
+      case Kind::fail:
+        ++summary.fail;
+        break;
+      case Kind::expected_open:
+        ++summary.expected_open;
+        break;
+      case Kind::unexpected_open:
+        ++summary.unexpected_open;
+        break;
+      case Kind::violated:
+        ++summary.violated;
+        break;
+      case Kind::error:
+        ++summary.errors;
+        break;
+      case Kind::not_run:
+        ++summary.not_run;
+        break;
+      case Kind::unclaimed:
+        ++summary.unclaimed;
+    }
+  }
+  summary.orders = fit_orders(run.cells);
+  const bool order_failed =
+      std::any_of(summary.orders.begin(), summary.orders.end(), [](const OrderFit& fit) { return fit.outcome == Outcome::fail; });
+  if (summary.fail > 0 || order_failed)
+    summary.exit = ExitCode::bias_proven;
+  else if (summary.errors > 0 || summary.altered > 0)
+    summary.exit = ExitCode::internal_error;
+  else if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0)
+    summary.exit = ExitCode::nothing_ran;
+  else if (summary.unexpected_open > 0 || summary.pass + summary.violated == 0)
+    summary.exit = ExitCode::inconclusive;
+  return summary;
+}
+
+std::string summary_text(const RunRecord& run, const Summary& summary) {
+  std::string text;
+  for (const Kind kind : {Kind::violated, Kind::expected_open, Kind::not_run, Kind::unexpected_open, Kind::error, Kind::fail})
+    for (const CellRecord& record : run.cells)
+      if (kind_of(record) == kind) text += fmt::format("{}: {}: {}\n", word(kind), record.cell.name, reason_of(record));
+  for (const OrderFit& fit : summary.orders) text += fmt::format("ORDER: {}\n", order_line(fit));
+  if (summary.altered > 0) text += fmt::format("{} verdicts in the file are not what its figures say\n", summary.altered);
+  return text + fmt::format("{}\n{}\n", counts(summary), families(run));
+}
+
+std::string summary_markdown(const RunRecord& run, const Summary& summary, const std::string& file) {
+  std::string text = fmt::format("### nullmark check: {}\n\n{}; {}.\n", run.name, counts(summary), families(run));
+  const auto table = [&](std::initializer_list<Kind> kinds, const std::string& title, bool commands) {
+    std::string rows;
+    std::size_t count = 0;
+    for (const CellRecord& record : run.cells)
+      if (std::find(kinds.begin(), kinds.end(), kind_of(record)) != kinds.end()) {
+        rows += fmt::format("| {} | {} | {} |\n", word(kind_of(record)), record.cell.name, reason_of(record));
+        if (commands) rows += fmt::format("| | | `{}` |\n", reproduction(record, file));
+        ++count;
+      }
+    if (count > 0)
+      text +=
+          fmt::format("\n<details{}><summary>{} ({})</summary>\n\n| verdict | cell | reason |\n|---|---|---|\n{}\n</details>\n",
+                      commands ? " open" : "", title, count, rows);
+  };
+  table({Kind::fail, Kind::error}, "Biased, or not computed", true);
+  table({Kind::unexpected_open}, "Undecided", false);
+  table({Kind::expected_open}, "Undecidable by their mean, as planned", false);
+  table({Kind::violated}, "Need a true majorant and did not have one", false);
+  if (!summary.orders.empty()) {
+    text += "\n| convergence order |\n|---|\n";
+    for (const OrderFit& fit : summary.orders) text += fmt::format("| {} |\n", order_line(fit));
+  }
+  return text;
+}
+
+}  // namespace nullmark
