@@ -105,9 +105,9 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
   // A pooled bias of five standard errors is hardly chance, whatever the number of cells.
   constexpr double kStandardErrors = 5;
   const std::vector<Prediction> predictions = predict(plan, selected);
-  std::vector<std::vector<std::string>> lines = {
-      {"cell", "rays", "samples/ray", "lookups/sample", "lookups", "seconds", "bias shown from", "status"}};
-  double total_samples = 0, total_lookups = 0;
+  std::vector<std::vector<std::string>> lines = {{"cell", "rays", "samples/ray", "lookups/sample", "lookups", "seconds",
+                                                  "bias shown from", "planned/ray", "verdict", "status"}};
+  double total_samples = 0, total_lookups = 0, lookups_to_decide = 0;
   bool all_known = true;
   for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i) {
     if (!selected[i]) continue;
@@ -119,16 +119,23 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
     lines.push_back({plan.cells[i].name, fmt::to_string(prediction.rays), fmt::to_string(prediction.samples_per_ray),
                      short_number(prediction.lookups_per_sample), short_number(lookups),
                      short_number(lookups ? std::optional(*lookups * kNsPerLookup * 1e-9) : std::nullopt),
-                     shown ? percent(*shown) : "-", prediction.status});
+                     shown ? percent(*shown) : "-", short_number(static_cast<Real>(prediction.planned)), prediction.verdict,
+                     prediction.status});
     if (prediction.status != "ok") continue;
     total_samples += samples;
     total_lookups += lookups.value_or(0);
+    if (prediction.verdict == "PASS")
+      lookups_to_decide += lookups.value_or(0) * std::max(1., static_cast<double>(prediction.planned) /
+                                                                  static_cast<double>(prediction.samples_per_ray));
+    else
+      lookups_to_decide += lookups.value_or(0);
     all_known &= lookups.has_value();
   }
   fmt::print(
-      "{}\n{} cells, {:.4g} samples, {}{:.4g} lookups, about {:.3g} s of one core at {} ns per lookup, timing not counted\n",
+      "{}\n{} cells, {:.4g} samples, {}{:.4g} lookups, about {:.3g} s of one core at {} ns per lookup, timing not counted; about "
+      "{:.4g} lookups with what the verdicts take\n",
       aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
-      total_lookups * kNsPerLookup * 1e-9, kNsPerLookup);
+      total_lookups * kNsPerLookup * 1e-9, kNsPerLookup, lookups_to_decide);
   return ExitCode::ok;
 }
 
@@ -249,6 +256,7 @@ ExitCode run_command(const RunCommand& command) {
     observer.cell_timed = [&](const CellRecord& record) {
       if (journal) journal->append(record);
     };
+    observer.verdict_share = [&](double share) { context.verdict_share = share; };
     observer.warning = [&](const std::string& message) { progress.warning(message); };
     std::vector<CellRecord> records = run_plan(plan, selected, finished, options, observer);
     for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i)

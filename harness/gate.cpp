@@ -86,6 +86,11 @@ void set_bets(MeanTest& test, const Pool& pool, Real low, Real high, bool analyt
   }
 }
 
+/// Without a variance to trust, only bets that need none can be placed.
+void drop_catoni(MeanTest& test) {
+  std::erase_if(test.bets, [](const auto& bet) { return bet.second.kind == Bet::Kind::catoni; });
+}
+
 /// Keeps the wealth of betting bets positive.
 void clip_rates(MeanTest& test, const Pool& pool, Real low, Real high, int errors_per_sum) {
   for (auto& [role, bet] : test.bets) {
@@ -189,6 +194,8 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
 
   gate.errors_per_sum = gate.lookups_per_sum =
       static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
+  const bool bounded = std::isfinite(gate.low) && std::isfinite(gate.high);
+  const bool distrusted = !analytic && !bounded && pilot->variance_of_variance >= kTrustedVariance;
   std::vector<Pool> pools;
   constexpr Real kUlp = std::numeric_limits<Real>::epsilon();
   const Real mean_lookups = theory.lookups.value_or(0);
@@ -222,13 +229,17 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
       test.reference_error = pool.reference_error / n;
       test.variance = pool.variance / n;
       const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0;
-      test.rounding = 64 * kUlp * (1 + mean_lookups + depth) * std::max(std::abs(pool.most), std::abs(pool.least));
-      test.deterministic = !(test.variance > test.rounding * test.rounding);
+      test.rounding = 64 * kUlp * (1 + mean_lookups + depth) *
+                      std::max(std::abs(pool.most),
+                               std::abs(pool.least));  // Rare events that a pilot did not see are no proof of a zero variance.
+      test.deterministic = analytic && !(test.variance > test.rounding * test.rounding);
+      if (!analytic && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
       pools.push_back(pool);
       if (test.deterministic)
         test.basis = "deterministic";
       else
         set_bets(test, pool, gate.low, gate.high, analytic, gate.errors_per_sum);
+      if (distrusted) drop_catoni(test);
       gate.tests.push_back(std::move(test));
     }
   }
@@ -240,7 +251,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
 
   for (std::size_t i = 0; i < gate.tests.size(); ++i) {
     MeanTest& test = gate.tests[i];
-    if (test.deterministic) continue;
+    if (test.deterministic || test.bets.empty()) continue;
     clip_rates(test, pools[i], gate.low, gate.high, gate.errors_per_sum);
     test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), test.rays);
     gate.planned = std::max(gate.planned, test.planned);
@@ -248,13 +259,12 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
     if (test.reference_error > 0.25 * test.epsilon)
       gate.undecidable =
           fmt::format("the reference's own error {:.2g} is too coarse for epsilon {:.2g}", test.reference_error, test.epsilon);
-    else if (test.planned > gate.affordable && gate.undecidable.empty())
+    else if (kPatience * test.planned > gate.affordable && test.planned > cell.samples_per_ray && gate.undecidable.empty())
       gate.undecidable =
           fmt::format("PASS at epsilon {:.2g} needs about {:.2g} samples a ray (relative variance {:.2g}); {} are allowed",
                       test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean), gate.affordable);
   }
-  if (!analytic && gate.undecidable.empty() && pilot->variance_of_variance >= kTrustedVariance &&
-      !(std::isfinite(gate.low) && std::isfinite(gate.high)))
+  if (distrusted)
     gate.undecidable = fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
                                    pilot->variance_of_variance);
 
@@ -277,8 +287,8 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
     test.rays = rays;
     constexpr Real kCostEpsilon = 0.01;
     // Expected lookups come from a quadrature as well.
-    constexpr Real kTheoryError = 1e-6;
-    test.epsilon = kCostEpsilon * pool.mean / n;
+    constexpr Real kTheoryError = 1e-6;    // Below one lookup a sample a hundredth of a standard deviation is as much as anybody asks for.
+    test.epsilon = kCostEpsilon * std::max(pool.mean / n, std::sqrt(pool.variance / n));
     test.reference_error = kTheoryError * pool.mean / n;
     test.variance = pool.variance / n;
     test.rounding = test.reference_error;
@@ -321,13 +331,15 @@ TestRecord test_record(const MeanTest& test, const Evidence& evidence, int error
   const auto log_e = [&](Role role) {
     std::vector<Real> kinds;
     for (const auto& [key, logs] : wealth)
-      if (key.first == role) kinds.push_back(log_mean_exp(logs));
-    return log_mean_exp(kinds);
+      if (key.first == role)
+        kinds.push_back(log_mean_exp(logs));  // Rounded, so that the file tells as much as the decision used.
+    constexpr Real kDigits = 1e4;
+    return std::round(log_mean_exp(kinds) * kDigits) / kDigits;
   };
   record.log_e_fail = log_e(Role::fail);
   record.log_e_low = log_e(Role::low);
   record.log_e_high = log_e(Role::high);
-  record.rates = test.bets.front().second.rates;
+  if (!test.bets.empty()) record.rates = test.bets.front().second.rates;
   return record;
 }
 

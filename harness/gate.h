@@ -18,6 +18,9 @@ struct CellTheory;
 /// Groups that rays are judged in beside all of them together, since pooled biases cancel: tiles of an image, or runs of a list.
 inline constexpr int kRayGroups = 16;
 
+/// An open verdict may draw this many times the samples at which nearly all are decided.
+inline constexpr std::uint64_t kPatience = 4;
+
 /// The group of each ray; all 0 where there are too few rays for groups.
 std::vector<int> ray_groups(const BuiltRays& rays);
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,8 @@ namespace nullmark {
 /// What a run was made with and on: source, compiler, machine, libraries, command; values are JSON texts.  No host name.
 struct RunContext {
   std::vector<std::string> command_line;
-  int threads = 0;  ///< cores used
+  int threads = 0;                      ///< cores used
+  std::optional<double> verdict_share;  ///< time of the verdicts' evidence over that of the sampling
   std::vector<std::uint64_t> seeds;
   std::chrono::system_clock::time_point start = std::chrono::system_clock::now();
 };

@@ -159,6 +159,16 @@ void add_theory(std::vector<PreparedCell>& cells) {
   }
 }
 
+/// What verdicts cost beside the sampling they judge.
+struct Effort {
+  double judging = 0, working = 0;
+  Effort& operator+=(const Sampled& sampled) {
+    judging += sampled.judging_seconds;
+    working += sampled.working_seconds;
+    return *this;
+  }
+};
+
 /// Sizes of the families that a verdict's levels are shared out over.
 struct Families {
   std::uint64_t means = 1, lookups = 1;
@@ -168,34 +178,45 @@ struct Families {
 std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function<bool()>& stop) {
   // Far beyond the samples of any verdict, so that the streams are others.
   constexpr std::uint64_t kFirst = std::uint64_t{1} << 62;
-  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, {kFirst, prepared.samples_per_ray},
-                                   nullptr, stop, [](double) {});
+  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel,
+                                   {kFirst, prepared.samples_per_ray, true}, nullptr, stop, [](double) {});
   if (!sampled || prepared.samples_per_ray < 2) return std::nullopt;
   Pilot pilot;
   const auto channels = static_cast<std::size_t>(prepared.scene->reference->channels);
-  std::vector<Moments> pooled(channels);
-  for (std::size_t i = 0; i < sampled->moments.size(); ++i) {
-    pilot.variance.push_back(sampled->moments[i].variance());
-    pooled[i % channels] += sampled->moments[i];
-  }
   const auto n = static_cast<Real>(prepared.samples_per_ray);
+  std::vector<Real> second(channels), fourth(channels), raw(channels);  // central moments, summed over the rays
+  for (std::size_t i = 0; i < sampled->moments.size(); ++i) {
+    const Moments& x = sampled->moments[i];
+    const Real m = x.mean();
+    pilot.variance.push_back(x.variance());
+    second[i % channels] += std::max<Real>(0, x.s2 - n * m * m);
+    fourth[i % channels] += std::max<Real>(0, x.s4 - 4 * m * x.s3 + 6 * m * m * x.s2 - 3 * n * m * m * m * m);
+    raw[i % channels] += x.s2;
+  }
   for (std::size_t ray = 0; ray < sampled->lookups.size(); ++ray) {
     const Real mean = static_cast<Real>(sampled->lookups[ray]) / n;
     pilot.lookups_variance.push_back(std::max<Real>(0, (sampled->lookups_squared[ray] - n * mean * mean) / (n - 1)));
   }
-  for (const Moments& moments : pooled)
-    if (moments.s2 > 0)
-      pilot.variance_of_variance =
-          std::max(pilot.variance_of_variance, moments.s4 / (moments.s2 * moments.s2) - 1 / static_cast<Real>(moments.count));
+  // Below this share of the raw moment a central one is rounding.
+  constexpr Real kCancelled = 1e-6;
+  const auto count = n * static_cast<Real>(sampled->lookups.size());
+  for (std::size_t c = 0; c < channels; ++c) {
+    const bool seen = second[c] > kCancelled * raw[c];
+    pilot.variance_of_variance = std::max(pilot.variance_of_variance, seen ? fourth[c] / (second[c] * second[c]) - 1 / count : 1);
+  }
   return pilot;
+}
+
+bool is_judged(const PreparedCell& prepared) {
+  const bool predicts_itself = !prepared.theory.ray_variance.empty();
+  const bool claims = prepared.claim == Claim::exact || prepared.claim == Claim::unbiased ||
+                      (prepared.claim == Claim::consistent && predicts_itself);
+  return prepared.cell->gate.enabled && claims && prepared.cell->measurement == Measurement{};
 }
 
 /// The tests of a cell; nothing for cells that claim nothing that could be tested.
 std::optional<CellGate> gate_of(PreparedCell& prepared, const GateLevels& levels, const std::function<bool()>& stop) {
-  const bool predicts_itself = !prepared.theory.ray_variance.empty();
-  const bool claims = prepared.claim == Claim::exact || prepared.claim == Claim::unbiased ||
-                      (prepared.claim == Claim::consistent && predicts_itself);
-  if (!prepared.cell->gate.enabled || !claims || !(prepared.cell->measurement == Measurement{})) return std::nullopt;
+  if (!is_judged(prepared)) return std::nullopt;
   if (prepared.theory.ray_expected.empty())
     prepared.theory.ray_expected = expected_of(*prepared.scene, *prepared.kernel, prepared.cell->quantity);
   const bool spread_missing = !prepared.theory.ray_lookups.empty() && prepared.theory.ray_lookups_variance.empty();
@@ -208,9 +229,8 @@ std::optional<CellGate> gate_of(PreparedCell& prepared, const GateLevels& levels
 /// Looks at the evidence of the planned samples and draws further ones while the verdict is open, as many again each time, up to
 /// four times what the plan foresees and never more than is allowed.  Nothing where interrupted.
 std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
-                                   const GateLevels& levels, const Families& families, const std::function<bool()>& stop,
-                                   const std::function<void(double)>& progress) {
-  constexpr std::uint64_t kPatience = 4;
+                                   const GateLevels& levels, const Families& families, Effort& effort,
+                                   const std::function<bool()>& stop, const std::function<void(double)>& progress) {
   VerdictRecord verdict;
   verdict.against = gate.against;
   verdict.variance_basis = gate.variance_basis;
@@ -225,6 +245,7 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
   verdict.samples_per_ray = prepared.samples_per_ray;
   std::uint64_t violations = sampled.counters.violations;
   verdict.out_of_range = sampled.out_of_range;
+  effort += sampled;
   std::uint64_t wanted = 0;
   for (const MeanTest& test : gate.tests)
     if (test.planned <= gate.affordable) wanted = std::max(wanted, test.planned);
@@ -246,12 +267,32 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
     const SampleSpan span{verdict.samples_per_ray, std::min(verdict.samples_per_ray, left)};
     const auto more = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, span, &gate, stop, progress);
     if (!more) return std::nullopt;
+    effort += *more;
     for (std::size_t i = 0; i < evidence.size(); ++i) evidence[i] += more->evidence[i];
     verdict.samples_per_ray += span.per_ray;
     verdict.out_of_range += more->out_of_range;
     violations += more->counters.violations;
     verdict.nonfinite += more->nonfinite;
   }
+}
+
+/// What the verdict of a cell can be expected to say, before anything is sampled.
+void foresee(const PreparedCell& prepared, const GateLevels& levels, Prediction& prediction) {
+  const bool bounding = bounds_everywhere(*prepared.scene, *prepared.kernel);
+  prediction.most = prepared.samples_per_ray;
+  if (!is_judged(prepared)) {
+    prediction.verdict = "not judged";
+    return;
+  }
+  if (prepared.theory.ray_variance.empty()) {
+    prediction.verdict = "by a pilot";
+    return;
+  }
+  const CellGate gate = plan_gate(prepared.planned(), *prepared.scene, prepared.range, prepared.claim, bounding, prepared.theory,
+                                  std::nullopt, levels);
+  prediction.planned = gate.planned;
+  prediction.most = std::max(prediction.most, std::min(gate.affordable, gate.undecidable.empty() ? kPatience * gate.planned : 0));
+  prediction.verdict = prepared.needs_bound && !bounding ? "VIOLATED" : gate.undecidable.empty() ? "PASS" : "INCONCLUSIVE";
 }
 
 std::optional<Real> finite(Real x) { return std::isfinite(x) ? std::optional(x) : std::nullopt; }
@@ -409,6 +450,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
 
   const bool timing = options.timing && plan.timing.enabled;
   const Families families{mean_family(plan), lookups_family(plan)};
+  Effort effort;
   Workshop workshop(plan);
   std::vector<PreparedCell> cells =
       prepare_all(workshop, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
@@ -438,7 +480,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
       const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, {0, prepared.samples_per_ray},
                                        gate ? &*gate : nullptr, stop, progress);
       std::optional<VerdictRecord> verdict;
-      if (sampled && gate) verdict = judge(prepared, *gate, *sampled, plan.levels, families, stop, progress);
+      if (sampled && gate) verdict = judge(prepared, *gate, *sampled, plan.levels, families, effort, stop, progress);
       if (!sampled || (gate && !verdict)) {
         record.reason = "interrupted";
       } else {
@@ -462,6 +504,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
       if (times[i]) observer.cell_timed(record);
     }
   }
+  if (effort.working > 0) observer.verdict_share(effort.judging / (effort.working - effort.judging));
   std::vector<CellRecord> result;
   for (auto& [index, record] : records) result.push_back(std::move(record));
   return result;
@@ -490,6 +533,7 @@ std::vector<Prediction> predict(const Plan& plan, const std::vector<bool>& selec
       if (!prepared.theory.variance.empty() && prepared.theory.variance[0] && squares > 0)
         prediction.relative_variance = finite(*prepared.theory.variance[0] * static_cast<Real>(prediction.rays) / squares);
     }
+    if (prepared.scene && prepared.reason.empty()) foresee(prepared, plan.levels, prediction);
     result.push_back(prediction);
   }
   return result;

@@ -26,7 +26,9 @@ struct RunObserver {
                                                                                              std::size_t) {};
   std::function<void(const CellRecord&, double fraction)> progress = [](const CellRecord&, double) {};
   std::function<void(double fraction)> timing = [](double) {};
-  std::function<void(const CellRecord&)> cell_timed = [](const CellRecord&) {};
+  std::function<void(const CellRecord&)> cell_timed = [](const CellRecord&) {
+  };  /// Time that evidence took, over the time of the sampling it judges.
+  std::function<void(double)> verdict_share = [](double) {};
   std::function<void(const std::string&)> warning = [](const std::string&) {};
 };
 
@@ -40,7 +42,9 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
 struct Prediction {
   std::uint64_t rays = 0, samples_per_ray = 0;
   std::optional<double> lookups_per_sample, relative_variance;
-  std::string status;  ///< "ok" or the reason why it would be skipped
+  std::uint64_t planned = 0, most = 0;  ///< samples per ray: for a PASS where there is no bias, and the most that may be drawn
+  std::string verdict;                  ///< what can be expected of the cell: "PASS", "INCONCLUSIVE", "exact", "not judged", ...
+  std::string status;                   ///< "ok" or the reason why it would be skipped
 };
 std::vector<Prediction> predict(const Plan& plan, const std::vector<bool>& selected);
 

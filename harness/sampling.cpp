@@ -3,11 +3,14 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include <chrono>
 #include <cmath>
 #include <map>
 
 namespace nullmark {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 /// Samples that a kernel is asked for at once.
 constexpr int kBatchLevel = 14;
@@ -39,6 +42,7 @@ struct ChunkResult {
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
   std::map<std::size_t, Evidence> evidence;  ///< by test; a chunk touches few of them
+  Clock::duration judging{}, working{};
 };
 
 /// Errors on their way to the tests of a gate: summed in short runs, gathered over rays, and bet on by the thousand.
@@ -65,16 +69,16 @@ class Evidences {
   void add_errors(std::size_t ray, std::size_t channel, std::span<const Real> errors) {
     if (!gate_ || !pooled_[channel]) return;
     sum(errors, gate_->errors_per_sum);
-    feed(*pooled_[channel]);
-    if (!grouped_[channel].empty()) feed(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])]);
+    feed(*pooled_[channel], errors);
+    if (!grouped_[channel].empty()) feed(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])], errors);
   }
 
   void add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups) {
     if (!gate_ || !lookups_) return;
-    errors_.clear();
-    for (const std::uint32_t n : lookups) errors_.push_back(static_cast<Real>(n) - gate_->lookups[ray]);
+    errors_.resize(lookups.size());
+    for (std::size_t i = 0; i < lookups.size(); ++i) errors_[i] = static_cast<Real>(lookups[i]) - gate_->lookups[ray];
     sum(errors_, gate_->lookups_per_sum);
-    feed(*lookups_);
+    feed(*lookups_, errors_);
   }
 
   void finish() {
@@ -84,25 +88,23 @@ class Evidences {
  private:
   static constexpr std::size_t kTogether = 8192;
 
+  /// Which errors share a sum is free; a stride lets all sums advance together.
   void sum(std::span<const Real> errors, int together) {
-    sums_.clear();
-    largest_ = 0;
-    for (std::size_t i = 0; i < errors.size(); i += static_cast<std::size_t>(together)) {
-      Real total = 0;
-      for (int k = 0; k < together; ++k) {
-        const Real error = errors[i + static_cast<std::size_t>(k)];
-        total += error;
-        largest_ = std::max(largest_, std::abs(error));
-      }
-      sums_.push_back(total);
-    }
+    const std::size_t count = errors.size() / static_cast<std::size_t>(together);
+    sums_.assign(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(count));
+    for (std::size_t k = 1; k < static_cast<std::size_t>(together); ++k)
+      for (std::size_t j = 0; j < count; ++j) sums_[j] += errors[k * count + j];
   }
 
-  void feed(std::size_t test) {
+  void feed(std::size_t test, std::span<const Real> errors) {
+    Evidence& evidence = out_[test];
+    if (gate_->tests[test].deterministic) {
+      for (const Real error : errors) evidence.largest_error = std::max(evidence.largest_error, std::abs(error));
+      evidence.sums += sums_.size();
+      return;
+    }
     std::vector<Real>& waiting = pending_[test];
     waiting.insert(waiting.end(), sums_.begin(), sums_.end());
-    Evidence& evidence = out_[test];
-    evidence.largest_error = std::max(evidence.largest_error, largest_);
     if (waiting.size() >= kTogether) flush(test);
   }
 
@@ -120,7 +122,6 @@ class Evidences {
   std::optional<std::size_t> lookups_;
   std::vector<std::vector<Real>> pending_;  // by test
   std::vector<Real> sums_, errors_;
-  Real largest_ = 0;
 };
 
 std::vector<Chunk> cut(std::size_t rays, std::uint64_t samples, std::uint64_t chunk) {
@@ -130,7 +131,9 @@ std::vector<Chunk> cut(std::size_t rays, std::uint64_t samples, std::uint64_t ch
       for (std::uint64_t first = 0; first < samples; first += chunk)
         chunks.push_back({r, r + 1, first, std::min(chunk, samples - first)});
   } else {
-    const std::size_t together = std::max<std::size_t>(1, kBatch / samples);
+    // Small cells are cut as well, so that all threads have something to do.
+    constexpr std::size_t kLeastChunks = 8;
+    const std::size_t together = std::max<std::size_t>(1, std::min<std::size_t>(kBatch / samples, rays / kLeastChunks));
     for (std::size_t r = 0; r < rays; r += together) chunks.push_back({r, std::min(rays, r + together), 0, samples});
   }
   return chunks;
@@ -202,6 +205,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     out.lookups_squared.resize(chunk.end_ray - chunk.first_ray);
     out.groups.resize(channels);
     out.group_sums.assign(channels, 0);
+    const auto begun = Clock::now();
     Evidences evidences(gate, channels, out.evidence);
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
       scene.context(ray, kernel, mine.context);
@@ -216,27 +220,30 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         const std::uint64_t batch = std::min(kBatch, chunk.count - drawn);
         kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, span.first + chunk.first + drawn, batch,
                       cell.quantity, mine.block, out.counters);
-        mine.errors.resize(batch);
+        mine.errors.resize(batch * channels);
         for (std::size_t c = 0; c < channels; ++c) {
           Moments& moments = out.moments[local * channels + c];
           const Real reference = measured(expected[static_cast<Eigen::Index>(c)], cell.measurement);
           const Real shift = gate ? gate->shift[ray * channels + c] : 0;
           for (std::size_t i = 0; i < batch; ++i) {
             const Real value = mine.block.values[i * channels + c];
-            mine.errors[i] = 0;
+            mine.errors[c * batch + i] = 0;
             if (!std::isfinite(value)) {
               ++out.nonfinite;
               continue;
             }
             if (gate && !(value >= gate->low - kRangeSlack && value <= gate->high + kRangeSlack)) ++out.out_of_range;
             const Real error = measured(value, cell.measurement) - reference;
-            moments.add(error);
-            out.groups[c].add(error);
-            mine.errors[i] = error - shift;
+            const Real counted = span.about_zero ? value : error;
+            moments.add(counted);
+            out.groups[c].add(counted);
+            mine.errors[c * batch + i] = error - shift;
           }
-          evidences.add_errors(ray, c, mine.errors);
         }
+        const auto judging = Clock::now();
+        for (std::size_t c = 0; c < channels && gate; ++c) evidences.add_errors(ray, c, {&mine.errors[c * batch], batch});
         evidences.add_lookups(ray, mine.block.lookups);
+        out.judging += Clock::now() - judging;
         for (const std::uint32_t n : mine.block.lookups) out.lookups_squared[local] += static_cast<Real>(n) * n;
       }
       out.lookups[local] = out.counters.lookups - lookups_before;
@@ -245,7 +252,10 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         out.groups[c].finish_ray();
       }
     }
+    const auto judging = Clock::now();
     evidences.finish();
+    out.judging += Clock::now() - judging;
+    out.working += Clock::now() - begun;
     progress(static_cast<double>(++done) / static_cast<double>(chunks.size()));
   });
   if (stopped) return std::nullopt;
@@ -269,6 +279,8 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     result.counters += part.counters;
     result.nonfinite += part.nonfinite;
     result.out_of_range += part.out_of_range;
+    result.judging_seconds += std::chrono::duration<double>(part.judging).count();
+    result.working_seconds += std::chrono::duration<double>(part.working).count();
     for (const auto& [test, evidence] : part.evidence) result.evidence[test] += evidence;
   }
   if (span.per_ray > whole_chunk) {

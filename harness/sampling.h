@@ -19,12 +19,14 @@ struct Sampled {
   std::vector<GroupErrors> groups;     ///< per channel
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
-  std::vector<Evidence> evidence;  ///< one per test of the gate
+  std::vector<Evidence> evidence;                   ///< one per test of the gate
+  double judging_seconds = 0, working_seconds = 0;  ///< of all threads: evidence alone, and everything
 };
 
 /// Which of a cell's samples: first .. first + per_ray - 1 of every ray.
 struct SampleSpan {
   std::uint64_t first = 0, per_ray = 0;
+  bool about_zero = false;  ///< moments of the samples themselves instead of their errors
 };
 
 /// clamp, then quantise, as configured.

@@ -11,6 +11,8 @@ constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
 
 const std::vector<std::string> kOutcomes = {"", "PASS", "FAIL", "INCONCLUSIVE", "VIOLATED"};
 
+const std::vector<std::string> kBases = {"betting", "catoni", "catoni+betting", "deterministic"};
+
 Json real(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 
 Json outcome_json(Outcome outcome) { return outcome == Outcome::none ? Json(nullptr) : Json(to_string(outcome)); }
@@ -26,23 +28,40 @@ Real read_real(const Place& object, const char* key, Real instead) {
   return object.has(key) && !object[key].json().is_null() ? object[key].number() : instead;
 }
 
+bool deterministic(const TestRecord& test) { return test.basis == "deterministic"; }
+
 Json test_json(const TestRecord& test) {
-  Json json = {{"channel", test.channel},
-               {"group", test.group},
-               {"samples", test.samples},
-               {"epsilon", real(test.epsilon)},
-               {"reference_error", real(test.reference_error)},
-               {"variance", real(test.variance)},
-               {"basis", test.basis}};
-  if (test.basis == "deterministic") {
+  Json json = {{"channel", test.channel},         {"samples", test.samples},
+               {"epsilon", real(test.epsilon)},   {"reference_error", real(test.reference_error)},
+               {"variance", real(test.variance)}, {"basis", test.basis}};
+  if (deterministic(test)) {
     json["largest_error"] = real(test.largest_error);
     json["rounding"] = real(test.rounding);
   } else {
     json["log_e"] = {{"fail", real(test.log_e_fail)}, {"low", real(test.log_e_low)}, {"high", real(test.log_e_high)}};
     json["planned"] = test.planned;
-    if (test.group < 0) json["rates"] = test.rates;
+    json["rates"] = test.rates;
   }
   json["outcome"] = outcome_json(test.outcome);
+  return json;
+}
+
+/// The ray groups of a channel, one figure a list: they are many.
+Json groups_json(const std::vector<const TestRecord*>& groups) {
+  const TestRecord& first = *groups.front();
+  Json json = {{"epsilon", real(first.epsilon)}, {"samples", first.samples}};
+  const auto list = [&](const char* key, Real TestRecord::*figure) {
+    for (const TestRecord* test : groups) json[key].push_back(real(test->*figure));
+  };
+  for (const TestRecord* test : groups) json["basis"].push_back(test->basis);
+  list("reference_error", &TestRecord::reference_error);
+  list("log_e_fail", &TestRecord::log_e_fail);
+  list("log_e_low", &TestRecord::log_e_low);
+  list("log_e_high", &TestRecord::log_e_high);
+  if (std::any_of(groups.begin(), groups.end(), [](const TestRecord* test) { return deterministic(*test); })) {
+    list("largest_error", &TestRecord::largest_error);
+    list("rounding", &TestRecord::rounding);
+  }
   return json;
 }
 
@@ -50,12 +69,11 @@ TestRecord read_test(const Place& place) {
   place.expect_object();
   TestRecord test;
   test.channel = static_cast<int>(place["channel"].integer(-1, kMaxChannels - 1));
-  test.group = static_cast<int>(place["group"].integer(-1, 1 << 20));
   test.samples = place["samples"].unsigned_integer(0, kAny);
   test.epsilon = read_real(place, "epsilon", 0);
   test.reference_error = read_real(place, "reference_error", kInfinity);
   test.variance = read_real(place, "variance", kInfinity);
-  test.basis = place["basis"].one_of({"betting", "catoni", "catoni+betting", "deterministic"}, "basis");
+  test.basis = place["basis"].one_of(kBases, "basis");
   test.largest_error = read_real(place, "largest_error", kInfinity);
   test.rounding = read_real(place, "rounding", 0);
   if (test.basis != "deterministic") {
@@ -72,13 +90,46 @@ TestRecord read_test(const Place& place) {
   return test;
 }
 
+void read_groups(const Place& place, int channel, std::vector<TestRecord>& tests) {
+  place.expect_object();
+  const std::vector<Place> basis = place["basis"].elements();
+  std::vector<TestRecord> groups(basis.size());
+  const auto read = [&](const char* key, Real TestRecord::*figure, Real instead) {
+    if (!place.has(key)) return;
+    const std::vector<Place> figures = place[key].elements();
+    if (figures.size() != groups.size()) place[key].fail("found another number of entries than in \"basis\"");
+    for (std::size_t i = 0; i < groups.size(); ++i)
+      groups[i].*figure = figures[i].json().is_null() ? instead : figures[i].number();
+  };
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    groups[i].channel = channel;
+    groups[i].group = static_cast<int>(i);
+    groups[i].basis = basis[i].one_of(kBases, "basis");
+    groups[i].epsilon = read_real(place, "epsilon", 0);
+    groups[i].samples = place["samples"].unsigned_integer(0, kAny);
+    groups[i].largest_error = kInfinity;
+  }
+  read("reference_error", &TestRecord::reference_error, kInfinity);
+  read("log_e_fail", &TestRecord::log_e_fail, -kInfinity);
+  read("log_e_low", &TestRecord::log_e_low, -kInfinity);
+  read("log_e_high", &TestRecord::log_e_high, -kInfinity);
+  read("largest_error", &TestRecord::largest_error, kInfinity);
+  read("rounding", &TestRecord::rounding, 0);
+  tests.insert(tests.end(), groups.begin(), groups.end());
+}
+
 }  // namespace
 
 const char* to_string(Outcome outcome) { return kOutcomes[static_cast<std::size_t>(outcome)].c_str(); }
 
 Json verdict_json(const VerdictRecord& verdict) {
   Json tests = Json::array();
-  for (const TestRecord& test : verdict.tests) tests.push_back(test_json(test));
+  for (std::size_t i = 0; i < verdict.tests.size(); ++i) {
+    tests.push_back(test_json(verdict.tests[i]));
+    std::vector<const TestRecord*> groups;
+    while (i + 1 < verdict.tests.size() && verdict.tests[i + 1].group >= 0) groups.push_back(&verdict.tests[++i]);
+    if (!groups.empty()) tests.back()["groups"] = groups_json(groups);
+  }
   return {{"unbiased", outcome_json(verdict.unbiased)},
           {"own_mean", outcome_json(verdict.own_mean)},
           {"lookups", outcome_json(verdict.lookups)},
@@ -124,7 +175,10 @@ VerdictRecord read_verdict(const Place& place) {
   };
   verdict.alpha = level("alpha");
   verdict.alpha_pass = level("alpha_pass");
-  for (const Place& test : place["tests"].elements()) verdict.tests.push_back(read_test(test));
+  for (const Place& test : place["tests"].elements()) {
+    verdict.tests.push_back(read_test(test));
+    if (test.has("groups")) read_groups(test["groups"], verdict.tests.back().channel, verdict.tests);
+  }
   return verdict;
 }
 
