@@ -1,0 +1,11 @@
+#include "harness/registry.h"
+#include "media/field.h"
+#include "ripples.h"
+#include "roulette_ratio.h"
+
+namespace nullmark {
+
+NULLMARK_REGISTER_ESTIMATOR(RouletteRatioTracking);
+NULLMARK_REGISTER_MEDIUM(FieldSource<Ripples>);
+
+}  // namespace nullmark

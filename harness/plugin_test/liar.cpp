@@ -1,0 +1,8 @@
+#include "harness/registry.h"
+#include "lying_tracker.h"
+
+namespace nullmark {
+
+NULLMARK_REGISTER_ESTIMATOR(LyingTracker);
+
+}  // namespace nullmark
