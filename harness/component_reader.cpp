@@ -88,9 +88,11 @@ std::vector<std::string> names_of(const std::vector<ComponentInfo>& entries) {
 std::string read_type(ComponentKind kind, const Place& place) {
   std::vector<std::string> names = names_of(registered(kind));
   if (kind == ComponentKind::medium) names.push_back(kChannels);
-  if (place.json().is_string()) return place.one_of(names, to_string(kind));
-  if (!place.json().is_object()) place.expected(fmt::format("the name of a {} or an object with \"type\"", to_string(kind)));
-  return place["type"].one_of(names, to_string(kind));
+  if (!place.json().is_string() && !place.json().is_object())
+    place.expected(fmt::format("the name of a {} or an object with \"type\"", to_string(kind)));
+  const Place type = place.json().is_string() ? place : place["type"];
+  if (kind == ComponentKind::estimator && type.json().is_string() && is_planted(type.string())) return type.string();
+  return type.one_of(names, to_string(kind));
 }
 
 /// Components with the values that are given; `extra` keys are someone else's.

@@ -11,8 +11,7 @@ namespace {
 
 /// Sum of log factor(s), with one logarithm for every kTogether factors.
 template <class Factor>
-Real sum_of_logs(std::span<const Real> sums, Factor factor) {
-  // At most 2^127 each, so that eight of them stay finite.
+Real sum_of_logs(std::span<const Real> sums, Factor factor) {  // Factors are at most 2^100, so that eight of them stay finite.
   constexpr std::size_t kLanes = 64, kTogether = 8;
   std::array<Real, kLanes> product;
   Real total = 0;
@@ -42,8 +41,7 @@ std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums, int errors_
   for (const Real rate : bet.rates) {
     const Real l = rate * bet.side;
     if (bet.kind == Bet::Kind::betting) {
-      // A sample outside its declared range is reported elsewhere; here it must not make a wealth negative.
-      logs.push_back(sum_of_logs(sums, [=](Real s) { return std::clamp<Real>(1 + l * (s - shift), 0x1p-100, 0x1p100); }));
+      logs.push_back(sum_of_logs(sums, [=](Real s) { return std::min<Real>(1 + l * (s - shift), 0x1p100); }));
     } else {
       logs.push_back(sum_of_logs(sums, [=](Real s) {
         const Real y = l * (s - shift), size = std::min<Real>(std::abs(y), 0x1p50), f = 1 + size + size * size / 2;

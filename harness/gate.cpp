@@ -14,7 +14,7 @@ namespace {
 constexpr Real kUnknown = std::numeric_limits<Real>::quiet_NaN();
 
 /// Rates of the bets, as multiples of epsilon/variance: a mixture over them stands in for the rate that hindsight would pick.
-constexpr Real kFailRates[] = {0.25, 0.5, 1, 2}, kPassRates[] = {0.35, 0.7, 1};
+constexpr Real kFailRates[] = {0.4, 1.5}, kPassRates[] = {0.5, 0.9};
 
 /// Catoni's variance bound over the known variance: quadrature slack, and what PASS concedes ("given Var <= 1.25 sigma^2").
 constexpr Real kFailSlack = 1.02, kPassSlack = 1.25, kPilotSlack = 2;
@@ -73,8 +73,8 @@ void set_bets(MeanTest& test, const Pool& pool, Real low, Real high, bool analyt
   place(Role::high, bounded_above ? Kind::betting : Kind::catoni, -1, test.epsilon);
   test.basis = bounded_below && bounded_above ? "betting" : bounded_below || bounded_above ? "catoni+betting" : "catoni";
 
-  // Sums may be as long as a bet at its highest rate still resembles the product over single errors.
-  constexpr Real kSmall = 0.25;
+  // Sums may be as long as a bet at its highest rate still resembles the product over single errors.  constexpr Real kSmall =
+  // 0.5;
   for (const auto& [role, bet] : test.bets) {
     const Real rate = bet.rates.back();
     const auto fits = [&](int b) {
@@ -287,7 +287,8 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
     test.rays = rays;
     constexpr Real kCostEpsilon = 0.01;
     // Expected lookups come from a quadrature as well.
-    constexpr Real kTheoryError = 1e-6;    // Below one lookup a sample a hundredth of a standard deviation is as much as anybody asks for.
+    constexpr Real kTheoryError =
+        1e-6;  // Below one lookup a sample a hundredth of a standard deviation is as much as anybody asks for.
     test.epsilon = kCostEpsilon * std::max(pool.mean / n, std::sqrt(pool.variance / n));
     test.reference_error = kTheoryError * pool.mean / n;
     test.variance = pool.variance / n;

@@ -135,7 +135,11 @@ auto make(ComponentKind kind, const Component& component) {
 template <class Entry>
 std::vector<ComponentInfo> entries() {
   std::vector<ComponentInfo> result;
-  for (const Entry& entry : Registry<Entry>::instance().entries()) result.push_back({entry.name, entry.summary, entry.source});
+  for (const Entry& entry : Registry<Entry>::instance().entries()) {
+    if constexpr (std::is_same_v<Entry, EstimatorEntry>)
+      if (entry.planted) continue;
+    result.push_back({entry.name, entry.summary, entry.source});
+  }
   return result;
 }
 
@@ -174,6 +178,11 @@ std::vector<ComponentInfo> registered(ComponentKind kind) {
       break;
   }
   return entries<RaySetEntry>();
+}
+
+bool is_planted(std::string_view estimator) {
+  const EstimatorEntry* entry = Registry<EstimatorEntry>::instance().find(estimator);
+  return entry && entry->planted;
 }
 
 std::vector<ParameterInfo> parameters_of(ComponentKind kind, std::string_view type) {

@@ -34,8 +34,11 @@ struct ComponentInfo {
   std::string name, summary, source;
 };
 
-/// Sorted by name.
+/// Sorted by name, without planted bugs.
 std::vector<ComponentInfo> registered(ComponentKind kind);
+
+/// An estimator that `registered` leaves out although it may be named.
+bool is_planted(std::string_view estimator);
 
 /// In declared order.  Throws ParameterError for a type that is not registered.
 std::vector<ParameterInfo> parameters_of(ComponentKind kind, std::string_view type);

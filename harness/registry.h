@@ -17,21 +17,36 @@ struct EstimatorEntry {
   bool needs_bound = false;
   bool answers_optical_depth = false;
   std::unique_ptr<EstimatorSource> (*make)() = nullptr;
+  bool planted = false;   ///< a deliberately wrong tracker that the tests must catch; runs when named, is never listed
+  std::string caught_by;  ///< planted: the check that must see it
 };
 
 template <template <class> class Estimator>
 EstimatorEntry estimator_entry() {
   using E = Estimator<Real>;
-  return {.name = E::kName,
-          .summary = E::kSummary,
-          .source = E::kSource,
-          .range = E::kRange,
-          .needs_bound = E::kNeedsBound,
-          .answers_optical_depth =
-              requires(const E& e, typename E::Walk w, typename detail::RayOf<E, Real>::type r){e.optical_depth(w, r);
+  constexpr bool kAnswersDepth = requires(const E& e, typename E::Walk w, typename detail::RayOf<E, Real>::type r) {
+    e.optical_depth(w, r);
+  };
+  EstimatorEntry entry;
+  entry.name = E::kName;
+  entry.summary = E::kSummary;
+  entry.source = E::kSource;
+  entry.range = E::kRange;
+  entry.needs_bound = E::kNeedsBound;
+  entry.answers_optical_depth = kAnswersDepth;
+  entry.make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<EstimatorTemplate<Estimator>>(); };
+  return entry;
 }
-, .make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<EstimatorTemplate<Estimator>>(); }
-};  // namespace nullmark
+
+/// `Bug` has kCaughtBy: "mean", "count_law", "replay", "lookups", "variance", "independence", "audit", "nonfinite", "groups" or
+/// "position_law".
+template <template <class> class Bug, class Source = EstimatorTemplate<Bug>>
+EstimatorEntry planted_entry() {
+  EstimatorEntry entry = estimator_entry<Bug>();
+  entry.make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<Source>(); };
+  entry.planted = true;
+  entry.caught_by = Bug<Real>::kCaughtBy;
+  return entry;
 }
 
 }  // namespace nullmark
@@ -41,3 +56,8 @@ EstimatorEntry estimator_entry() {
 #define NULLMARK_REGISTER_ESTIMATOR(Estimator)                                                \
   [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_estimator_, __COUNTER__) = \
       ::nullmark::Registry<::nullmark::EstimatorEntry>::instance().add(::nullmark::estimator_entry<Estimator>())
+
+/// The same for a planted bug; `__VA_ARGS__` is its template and, where that is not EstimatorTemplate, its source.
+#define NULLMARK_REGISTER_PLANTED_BUG(...)                                                  \
+  [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_planted_, __COUNTER__) = \
+      ::nullmark::Registry<::nullmark::EstimatorEntry>::instance().add(::nullmark::planted_entry<__VA_ARGS__>())

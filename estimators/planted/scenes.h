@@ -1,0 +1,85 @@
+#pragma once
+
+#include "media/types.h"
+
+namespace nullmark {
+
+/// A scene on which a planted bug shows, as text for a configuration's matrix.
+struct PlantedScene {
+  const char* name;
+  const char* estimator;  ///< JSON
+  const char* medium;
+  const char* majorant;
+  const char* rays;
+  Real relative_bias;  ///< (mean - T)/T of channel 0, averaged over the rays; 0 where the bug leaves the mean alone
+  Real fresh = 1;      ///< share of 300000 samples a ray that do not repeat the random numbers of another
+};
+
+inline constexpr const char* kThroughTheBox = R"({"type":"single"})";
+inline constexpr const char* kSixteenPixels = R"({"type":"orthographic","width":16,"height":1})";
+inline constexpr const char* kBound = R"("global")";
+inline constexpr const char* kTwice = R"({"type":"global","looseness":2})";
+inline constexpr const char* kFiveTimes = R"({"type":"global","looseness":5})";
+inline constexpr const char* kTooLow = R"({"type":"global","looseness":0.9})";
+inline constexpr const char* kFourCells = R"({"type":"grid","resolution":4,"resolution_y":1,"resolution_z":1})";
+inline constexpr const char* kConstant = R"({"type":"homogeneous","extinction":1})";
+inline constexpr const char* kRising = R"({"type":"linear","begin":0.5,"end":1.5})";
+inline constexpr const char* kThreeChannels = R"({"type":"homogeneous","extinction":0.5,"spectrum":[1,2,4]})";
+/// Constant along each ray of kSixteenPixels, one period over the image, the same at both its ends.
+inline constexpr const char* kStripes = R"({"type":"cosine","frequency":6.283185307179586,"phase":0})";
+
+/// Every planted bug once.  Biases are closed forms, or sums and integral equations solved to the digits given.
+inline constexpr PlantedScene kPlantedScenes[] = {
+    // e^{.01 tau} - 1, tau = 2
+    {"planted_flight_rate", R"("planted_flight_rate")", R"({"type":"homogeneous","extinction":2})", kFiveTimes, kThroughTheBox,
+     0.0202013},
+    // e^{11/32} - 1
+    {"planted_last_segment", R"("planted_last_segment")", kRising, kFourCells, kThroughTheBox, 0.410226},
+    // e^{5/32} - 1
+    {"planted_first_segment", R"("planted_first_segment")", kRising, kFourCells, kThroughTheBox, 0.169118},
+    // mub = mu, so T is the chance of no collision: e^{-1/4 - 2/4 - 3/4 - 1} in place of e^{-1}
+    {"planted_no_rewind", R"("planted_no_rewind")", kConstant, kFourCells, kThroughTheBox, -0.776870},
+    // 1 - e^{-1}: the first collision never counts
+    {"planted_previous_extinction", R"("planted_previous_extinction")", kConstant, kTwice, kThroughTheBox, 0.632121},
+    // W(x) = e^{-(1-x)} + (1 - mu(x)) int_x^1 e^{-(y-x)} W(y) dy
+    {"planted_path_start", R"("planted_path_start")", R"({"type":"linear","begin":0,"end":1})", kBound, kThroughTheBox, 0.462155},
+    // sum_k Poisson(4; k) 2^{-max(0, k - 6)} - 1: 0.8^7 is the first weight below 1/4
+    {"planted_roulette", R"("planted_roulette")", kConstant, kFiveTimes, kThroughTheBox, -0.0714046},
+    // e^{.1} cosh(.1) - 1: even powers of 1 - 1/.9 survive
+    {"planted_clamped_ratio", R"("planted_clamped_ratio")", kConstant, kTooLow, kThroughTheBox, 0.110701},
+    // factors uniform in [0,2], Poisson(.2) of them, T_c = e^{-.2}
+    {"planted_clamped_residual", R"({"type":"planted_clamped_residual","control":"average"})",
+     R"({"type":"linear","begin":0,"end":0.4})", kBound, kThroughTheBox, -0.0298218},
+    // e^{.1} - 1
+    {"planted_capped_extinction", R"("planted_capped_extinction")", kConstant, kTooLow, kThroughTheBox, 0.105171},
+    {"planted_zero", R"("planted_zero")", kConstant, kFiveTimes, kThroughTheBox, -1},
+    {"planted_reference", R"("planted_reference")", kConstant, kFiveTimes, kThroughTheBox, 0},
+    {"planted_nan", R"({"type":"planted_nan","chance":1e-4})", kConstant, kFiveTimes, kThroughTheBox, 0},
+    {"planted_coin", R"("planted_coin")", kConstant, kFiveTimes, kThroughTheBox, 0},
+    {"planted_second_lookup", R"("planted_second_lookup")", kConstant, kFiveTimes, kThroughTheBox, 0},
+    // 2 e^{-1}/(1 - e^{-2}) - 1: each turn escapes with e^{-2} or is killed with (1 - 3 e^{-2})/2
+    {"planted_decomposition_reset", R"("planted_decomposition_reset")", R"({"type":"linear","begin":0.5,"end":2.5})", kBound,
+     kThroughTheBox, -0.149082},
+    // W(x) = e^{-5(1-x)} + .9 int_0^{-log .8} 5 e^{-s} W(x + s) ds
+    {"planted_step_parenthesis", R"("planted_step_parenthesis")", R"({"type":"homogeneous","extinction":0.5})",
+     R"({"type":"global","looseness":10})", kThroughTheBox, 0.381547},
+    // 2 e^{-1} - e^{-2} - 1
+    {"planted_whole_depth", R"("planted_whole_depth")", kConstant, kTwice, kThroughTheBox, -0.399576},
+    // (e + 1)/(2 e) - 1
+    {"planted_terminal_term", R"("planted_terminal_term")", kConstant, kTwice, kThroughTheBox, -0.316060},
+    // e^{-1/2} - 1
+    {"planted_control_twice", R"("planted_control_twice")", kRising, kBound, kThroughTheBox, -0.393469},
+    // e^{3/8} - 1
+    {"planted_channel_majorant", R"("planted_channel_majorant")", kThreeChannels, kTwice, kThroughTheBox, 0.454991},
+    // e^{-1/2} - 1
+    {"planted_channel_swap", R"("planted_channel_swap")", kThreeChannels, kTwice, kThroughTheBox, -0.393469},
+    // recursion over lookups spent
+    {"planted_budget", R"("planted_budget")", kConstant, kFiveTimes, kThroughTheBox, -0.0145815},
+    {"planted_neighbour", R"("planted_neighbour")", kStripes, kTwice, kSixteenPixels, 0},
+    {"planted_paired_streams", R"("planted_paired_streams")", kConstant, kFiveTimes, kThroughTheBox, 0, 1. / 2},
+    {"planted_ray_streams", R"("planted_ray_streams")", kStripes, kTwice, kSixteenPixels, 0, 1. / 16},
+    // calls of 16384 samples
+    {"planted_batch_streams", R"("planted_batch_streams")", kConstant, kFiveTimes, kThroughTheBox, 0, 16384. / 300000},
+};
+
+}  // namespace nullmark

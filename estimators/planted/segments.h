@@ -1,0 +1,68 @@
+#pragma once
+
+#include "estimators/ratio.h"
+
+namespace nullmark {
+
+/// Ratio tracking that leaves a traversal one cell too early: the loop runs while a next cell exists.  Mean T exp(tau of the last
+/// segment).
+template <class Value>
+struct PlantedLastSegment : RatioTracking<Value> {
+  static constexpr const char* kName = "planted_last_segment";
+  static constexpr const char* kSummary = "wrong: ratio tracking that skips the last segment";
+  static constexpr const char* kSource = "";
+  static constexpr const char* kCaughtBy = "mean";
+
+  using Walk = typename RatioTracking<Value>::Walk;
+
+  bool propose(Walk&, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+    return flight.next(rng) && flight.piece() + 1 < ray.majorant.size();
+  }
+};
+
+/// Ratio tracking that steps to the next cell before it uses the first one.  Mean T exp(tau of the first segment).
+template <class Value>
+struct PlantedFirstSegment : RatioTracking<Value> {
+  static constexpr const char* kName = "planted_first_segment";
+  static constexpr const char* kSummary = "wrong: ratio tracking that skips the first segment";
+  static constexpr const char* kSource = "";
+  static constexpr const char* kCaughtBy = "mean";
+
+  using Walk = typename RatioTracking<Value>::Walk;
+
+  bool propose(Walk&, const Passage<Value>&, Flight& flight, auto& rng) const {
+    while (flight.next(rng))
+      if (flight.piece() > 0) return true;
+    return false;
+  }
+};
+
+/// Ratio tracking that draws a new flight for each cell it enters, as the exponential's lack of memory allows, but starts it at
+/// the last collision instead of at the cell's boundary.  A flight that left its cell gets another chance to end in it: too many
+/// collisions, mean below T.
+template <class Value>
+struct PlantedNoRewind : RatioTracking<Value> {
+  static constexpr const char* kName = "planted_no_rewind";
+  static constexpr const char* kSummary = "wrong: ratio tracking that redraws its flight at a cell boundary without moving there";
+  static constexpr const char* kSource = "";
+  static constexpr const char* kCaughtBy = "count_law";
+
+  struct Walk : RatioTracking<Value>::Walk {
+    std::size_t cell = 0;
+  };
+
+  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+    RatioTracking<Value>::init(walk, ray, flight, rng);
+    walk.cell = 0;
+  }
+
+  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+    for (; walk.cell < ray.majorant.size(); ++walk.cell) {
+      const Real depth = flight.depth() + rng.exponential();
+      if (depth < ray.majorant.depth_after(walk.cell)) return flight.advance_to(depth);
+    }
+    return false;
+  }
+};
+
+}  // namespace nullmark
