@@ -9,10 +9,15 @@
 namespace nullmark {
 namespace {
 
-/// Sum of log factor(s), with one logarithm for every kTogether factors.
+/// Largest factor: more than that is not won at once.  Its kTogether-th power is finite.
+constexpr Real kMostWon = 0x1p30;
+
+/// Sum of log factor(s), factor <= kMostWon, with one logarithm for every kTogether factors.
 template <class Factor>
-Real sum_of_logs(std::span<const Real> sums, Factor factor) {  // Factors are at most 2^100, so that eight of them stay finite.
-  constexpr std::size_t kLanes = 64, kTogether = 8;
+Real sum_of_logs(std::span<const Real> sums, Factor factor) {
+  constexpr std::size_t kLanes = 64, kTogether = 32;
+  // A wealth that is lost for good; what this adds to its expectation is nothing.
+  constexpr Real kLost = 1e-300;
   std::array<Real, kLanes> product;
   Real total = 0;
   for (std::size_t i = 0; i < sums.size();) {
@@ -27,6 +32,7 @@ Real sum_of_logs(std::span<const Real> sums, Factor factor) {  // Factors are at
       }
       i += n;
     }
+    for (Real& x : product) x = std::max(x, kLost);
     negative_logarithms(product.data(), kLanes, product.data());
     for (const Real negative : product) total -= negative;
   }
@@ -41,11 +47,11 @@ std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums, int errors_
   for (const Real rate : bet.rates) {
     const Real l = rate * bet.side;
     if (bet.kind == Bet::Kind::betting) {
-      logs.push_back(sum_of_logs(sums, [=](Real s) { return std::min<Real>(1 + l * (s - shift), 0x1p100); }));
+      logs.push_back(sum_of_logs(sums, [=](Real x) { return std::min(1 + l * (x - shift), kMostWon); }));
     } else {
-      logs.push_back(sum_of_logs(sums, [=](Real s) {
-        const Real y = l * (s - shift), size = std::min<Real>(std::abs(y), 0x1p50), f = 1 + size + size * size / 2;
-        return y >= 0 ? f : 1 / f;
+      logs.push_back(sum_of_logs(sums, [=](Real x) {
+        const Real y = l * (x - shift), size = std::abs(y), f = 1 + size + size * size / 2;
+        return y >= 0 ? std::min(f, kMostWon) : 1 / f;
       }));
     }
   }

@@ -73,8 +73,8 @@ void set_bets(MeanTest& test, const Pool& pool, Real low, Real high, bool analyt
   place(Role::high, bounded_above ? Kind::betting : Kind::catoni, -1, test.epsilon);
   test.basis = bounded_below && bounded_above ? "betting" : bounded_below || bounded_above ? "catoni+betting" : "catoni";
 
-  // Sums may be as long as a bet at its highest rate still resembles the product over single errors.  constexpr Real kSmall =
-  // 0.5;
+  // Sums may be as long as a bet at its highest rate still resembles the product over single errors.
+  constexpr Real kSmall = 0.5;
   for (const auto& [role, bet] : test.bets) {
     const Real rate = bet.rates.back();
     const auto fits = [&](int b) {
@@ -234,6 +234,8 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
                                std::abs(pool.least));  // Rare events that a pilot did not see are no proof of a zero variance.
       test.deterministic = analytic && !(test.variance > test.rounding * test.rounding);
       if (!analytic && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
+      // Far below epsilon a variance decides nothing, and theory's may be rounding.
+      if (!test.deterministic) test.variance = std::max(test.variance, test.epsilon * test.epsilon / 4);
       pools.push_back(pool);
       if (test.deterministic)
         test.basis = "deterministic";

@@ -86,7 +86,7 @@ class Evidences {
   }
 
  private:
-  static constexpr std::size_t kTogether = 8192;
+  static constexpr std::size_t kTogether = 8192, kEnough = 2048;
 
   /// Which errors share a sum is free; a stride lets all sums advance together.
   void sum(std::span<const Real> errors, int together) {
@@ -104,15 +104,22 @@ class Evidences {
       return;
     }
     std::vector<Real>& waiting = pending_[test];
+    if (waiting.empty() && sums_.size() >= kEnough) {
+      evidence.add(gate_->tests[test], sums_, sum_length(test));
+      return;
+    }
     waiting.insert(waiting.end(), sums_.begin(), sums_.end());
     if (waiting.size() >= kTogether) flush(test);
   }
 
   void flush(std::size_t test) {
     if (pending_[test].empty()) return;
-    const MeanTest& plan = gate_->tests[test];
-    out_[test].add(plan, pending_[test], plan.channel == MeanTest::kLookups ? gate_->lookups_per_sum : gate_->errors_per_sum);
+    out_[test].add(gate_->tests[test], pending_[test], sum_length(test));
     pending_[test].clear();
+  }
+
+  int sum_length(std::size_t test) const {
+    return gate_->tests[test].channel == MeanTest::kLookups ? gate_->lookups_per_sum : gate_->errors_per_sum;
   }
 
   const CellGate* gate_;
