@@ -25,6 +25,8 @@ struct DeltaTracking {
 
   Claim claim(Quantity) const { return Claim::unbiased; }
 
+  bool flies_once(int channels) const { return walks == "shared" || channels == 1; }
+
   struct Ray : Passage<Value> {
     std::vector<Rates> per_channel;  ///< empty where the channels share one walk
   };

@@ -30,6 +30,15 @@ struct Theory {
   std::optional<Real> lookups_variance{};  ///< of one sample
 };
 
+/// Moments of a product estimator given its number K of collisions: with rate m, weights w(x) and collision depth M = int m,
+/// E[X | K = k] = factor (int m w / M)^k and E[X^2 | K = k] = factor^2 (int m w^2 / M)^k; K is Poisson of mean M.
+struct CountLaw {
+  Real depth = 0;  ///< M
+  Real factor = 1;
+  Real first = 0;   ///< int m w / M
+  Real second = 0;  ///< int m w^2 / M
+};
+
 /// One ray's way through the medium, as all walks of a block share it.
 template <class Value>
 struct Passage {
@@ -62,16 +71,20 @@ struct Passage {
 // and where it has them
 //
 //   void parameters(ParameterVisitor&)
-//   SampleRange range() const                     where the range depends on the parameters
-//   Real order(Quantity) const                    of a consistent estimator: |bias| ~ h^order
-//   using Ray = ...; void prepare(Ray&) const     per-ray data of its own, derived from Passage<Value>; default Ray =
-//   Passage<Value> Value optical_depth(const Walk&, const Ray&) const             answers Quantity::optical_depth as well int
-//   real_collisions(const Walk&, const Ray&) const             tentative collisions that ended a walk; default 0 static constexpr
-//   bool kIgnoresMajorant                         lookups are no tentative collisions: neither audited nor counted as such static
-//   constexpr bool kNeedsOpticalDepth, kNeedsKnots          asks the harness to fill exact_depth, knots Value expected(const
-//   Value& tau, const Ray&) const             target other than exp(-tau), e.g. a factor of T Theory theory(const Ray&, const
-//   RayProfile&, int channel, Quantity) const void check(const Extrema& medium) const       throws ParameterError for parameters
-//   that do not fit the medium
+//   void check(const Extrema& medium) const                 throws ParameterError: parameters do not fit the medium
+//   SampleRange range() const                               where the range depends on the parameters
+//   Real order(Quantity) const                              of a consistent estimator: |bias| ~ h^order
+//   using Ray = ...; void prepare(Ray&) const               per-ray data of its own, derived from Passage<Value>
+//   Value optical_depth(const Walk&, const Ray&) const      answers Quantity::optical_depth as well
+//   Value expected(const Value& tau, const Ray&) const      a target other than exp(-tau), e.g. a factor of T
+//   bool flies_once(int channels) const                     false where a sample is several flights; default true
+//   int real_collisions(const Walk&, const Ray&) const      tentative collisions that ended a walk; default 0
+//   Theory theory(const Ray&, const RayProfile&, int channel, Quantity) const
+//   CountLaw count_law(const Ray&, const RayProfile&, int channel) const
+//                                                           of a product of independent weights
+//   static constexpr bool kIgnoresMajorant                  lookups are no tentative collisions: not audited
+//   static constexpr bool kOwnFlights                       draws its flights by a law of its own
+//   static constexpr bool kNeedsOpticalDepth, kNeedsKnots   asks the harness to fill exact_depth, knots
 //
 // The loop, the counting, the majorant audit and the random streams are the harness's.
 

@@ -30,6 +30,21 @@ struct RatioTracking {
 
   Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
 
+  /// Partial expectations E[X; K = k] = e^{-M} (int (mub - mu))^k / k!, and of X^2 with (mub - mu)^2/mub.
+  CountLaw count_law(const Passage<Value>& ray, const RayProfile& profile, int c) const {
+    const Real depth = ray.majorant.total_depth();
+    const auto weight = [&](const RayProfile::Node& at) {
+      const Real rate = ray.majorant.rate(at.piece);
+      return rate > 0 ? (rate - at.extinction) / rate : 0;
+    };
+    const auto moment = [&](int power) {
+      return profile.integrate(c, [&](const RayProfile::Node& at) {
+        return ray.majorant.rate(at.piece) * std::pow(weight(at), power);
+      }) / depth;
+    };
+    return {depth, 1, moment(1), moment(2)};
+  }
+
   Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     const Real transmittance = std::exp(-profile.optical_depth(c));
     const Real spread = profile.integrate(c, [&](const RayProfile::Node& at) {

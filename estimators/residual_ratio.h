@@ -70,6 +70,19 @@ struct ResidualRatioTracking {
     return exponential(Value(ray.with_control ? Value(-residual - ray.control.depth) : Value(-residual)));
   }
 
+  /// The residual's partial expectations: E[X; K = k] = T_c e^{-M} (int (mubr - (mu - mu_c)))^k / k!, M = int mubr.
+  CountLaw count_law(const Ray& ray, const RayProfile& profile, int c) const {
+    const Real depth = ray.residual.total_depth();
+    const auto moment = [&](int power) {
+      return profile.integrate(c, [&](const RayProfile::Node& at) {
+        const Real rest = at.extinction - channel(ray.control.at(at.t, at.piece), c), rate = ray.residual.rate(at.piece);
+        return rate > 0 ? rate * std::pow((rate - rest) / rate, power) : 0;
+      }) / depth;
+    };
+    const Real control = ray.with_control ? std::exp(-channel(ray.control.depth, c)) : 1;
+    return {ray.with_residual ? depth : 0, control, moment(1), moment(2)};
+  }
+
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
     if (!ray.with_residual) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     const Real spread = profile.integrate(c, [&](const RayProfile::Node& at) {

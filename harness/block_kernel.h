@@ -102,9 +102,31 @@ class BlockKernel final : public Kernel {
     out.values.resize(count * channels);
     out.lookups.assign(count, 0);
     counters.samples += count;
-    for (std::size_t done = 0; done < count; done += kBlock)
-      run_block(state, medium, context, key, first + done, std::min(kBlock, count - done), quantity, &out.values[done * channels],
-                &out.lookups[done], counters);
+    for (std::size_t done = 0; done < count; done += kBlock) {
+      const auto run = state.recording ? &BlockKernel::run_block<true> : &BlockKernel::run_block<false>;
+      (this->*run)(state, medium, context, key, first + done, std::min(kBlock, count - done), quantity,
+                   &out.values[done * channels], &out.lookups[done], counters);
+    }
+  }
+
+  bool flies() const override {
+    constexpr bool by_another_law = requires { E::kIgnoresMajorant; }
+    || requires { E::kOwnFlights; };
+    if constexpr (requires { estimator_.flies_once(channels_); }) return !by_another_law && estimator_.flies_once(channels_);
+    return !by_another_law;
+  }
+
+  bool states_count_law() const override {
+    return requires(const E& e, const Ray& ray, const RayProfile& profile) { e.count_law(ray, profile, 0); };
+  }
+
+  std::vector<CountLaw> count_law(const Workspace& workspace, const RayProfile& profile) const override {
+    std::vector<CountLaw> laws;
+    if constexpr (requires(Ray r) { estimator_.count_law(r, profile, 0); }) {
+      const Ray& ray = static_cast<const State&>(workspace).ray;
+      for (int c = 0; c < channels_; ++c) laws.push_back(estimator_.count_law(ray, profile, c));
+    }
+    return laws;
   }
 
   Spectrum expected(const Workspace& workspace, const Spectrum& optical_depth, Quantity quantity) const override {
@@ -127,6 +149,7 @@ class BlockKernel final : public Kernel {
   }
 
  private:
+  template <bool recorded>
   void run_block(State& state, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
                  std::size_t count, Quantity quantity, Real* values, std::uint32_t* lookups, Counters& counters) const {
     const Ray& ray = state.ray;
@@ -136,6 +159,11 @@ class BlockKernel final : public Kernel {
       state.flight[k].start(ray.majorant);
       estimator_.init(state.walk[k], ray, state.flight[k], state.rng[k]);
       state.active[k] = static_cast<std::uint32_t>(k);
+    }
+    std::size_t recorded_before = 0;
+    if constexpr (recorded) {
+      recorded_before = state.recording->walks.size();
+      state.recording->walks.resize(recorded_before + count);
     }
     const Vec3 origin = context.local.origin, direction = context.local.direction;
     std::size_t active = count;
@@ -154,6 +182,12 @@ class BlockKernel final : public Kernel {
           state.active[kept++] = k;
         } else {
           finish(state, ray, k, quantity, values + k * channels);
+          if constexpr (recorded) {
+            Recording::Walk& walk = state.recording->walks[recorded_before + k];
+            walk.depth = flight.depth();
+            walk.total_depth = flight.depth() + flight.depth_left();
+            walk.draws = state.rng[k].draws();
+          }
           counters.draws += state.rng[k].draws();
           counters.lookups += lookups[k];
           counters.null_collisions += null_collisions(state.walk[k], ray, lookups[k]);
@@ -165,6 +199,13 @@ class BlockKernel final : public Kernel {
       for (std::size_t a = 0; a < active; ++a) {
         const std::uint32_t k = state.active[a];
         const Value extinction = load<Value>(&state.extinction[a * channels], channels_);
+        if constexpr (recorded) {
+          Recording::Walk& walk = state.recording->walks[recorded_before + k];
+          const Flight& at = state.flight[k];
+          walk.steps.push_back({at.position(), at.depth(), flies() ? at.rate() : 0});
+          walk.extinction.insert(walk.extinction.end(), &state.extinction[a * channels],
+                                 &state.extinction[a * channels] + channels);
+        }
         audit(ray, state.flight[k], extinction, counters);
         estimator_.consume(state.walk[k], ray, state.flight[k], extinction, state.rng[k]);
         if (++lookups[k] == kMostLookups) {

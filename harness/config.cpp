@@ -66,13 +66,17 @@ Real read_positive(const Place& place) {
 }
 
 GateSpec read_gate(const Place& place) {
-  place.expect_keys({"enabled", "epsilon", "max_samples_per_ray", "max_lookups_per_ray"});
+  place.expect_keys({"enabled", "epsilon", "max_samples_per_ray", "max_lookups_per_ray", "laws"});
   GateSpec gate;
   if (place.has("enabled")) gate.enabled = place["enabled"].boolean();
   if (place.has("epsilon")) gate.epsilon = read_positive(place["epsilon"]);
   if (place.has("max_samples_per_ray"))
     gate.max_samples_per_ray = place["max_samples_per_ray"].unsigned_integer(0, std::uint64_t{1} << 53);
   if (place.has("max_lookups_per_ray")) gate.max_lookups_per_ray = read_positive(place["max_lookups_per_ray"]);
+  if (place.has("laws")) {
+    const std::string policy = place["laws"].one_of(law_policies(), "policy");
+    gate.laws = static_cast<LawPolicy>(std::find(law_policies().begin(), law_policies().end(), policy) - law_policies().begin());
+  }
   return gate;
 }
 

@@ -359,4 +359,6 @@ std::uint64_t lookups_family(const Plan& plan) {
   return std::max<std::uint64_t>(1, tests);
 }
 
+std::uint64_t laws_family(const Plan& plan) { return kLaws * lookups_family(plan); }
+
 }  // namespace nullmark

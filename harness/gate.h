@@ -90,4 +90,10 @@ TestRecord test_record(const MeanTest& test, const Evidence& evidence, int error
 std::uint64_t mean_family(const Plan& plan);
 std::uint64_t lookups_family(const Plan& plan);
 
+/// Laws that a whole configuration may test.
+std::uint64_t laws_family(const Plan& plan);
+
+/// How many laws a cell can be tested for, at most.
+inline constexpr std::uint64_t kLaws = 9;
+
 }  // namespace nullmark

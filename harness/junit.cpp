@@ -50,6 +50,7 @@ Ending ending(const CellRecord& record) {
   if (!record.verdict) return {};
   const VerdictRecord& verdict = *record.verdict;
   if (verdict.unbiased == Outcome::fail || verdict.own_mean == Outcome::fail) return {"failure", "FAIL: " + verdict.reason};
+  if (verdict.lawful == Outcome::fail) return {"failure", "FAIL: a law of the walks is broken"};
   if (verdict.lookups == Outcome::fail) return {"failure", "FAIL: lookups differ from their expectation"};
   if (verdict.unbiased == Outcome::inconclusive || verdict.own_mean == Outcome::inconclusive)
     return {"skipped", "INCONCLUSIVE: " + verdict.reason};

@@ -43,6 +43,23 @@ struct Counters {
   }
 };
 
+/// What walks did, one entry per sample in the order drawn: for replay, and for laws that a mean does not show.
+struct Recording {
+  struct Step {
+    Real position;  ///< of the lookup, world length
+    Real depth;     ///< int rate from the ray's begin to it
+    Real rate;      ///< of the flight there, 1/length
+  };
+  struct Walk {
+    std::vector<Step> steps;
+    std::vector<Real> extinction;  ///< [step * channels + c]
+    Real depth = 0;                ///< where the flight ended
+    Real total_depth = 0;          ///< of the rates it flew through
+    std::uint64_t draws = 0;
+  };
+  std::vector<Walk> walks;
+};
+
 /// Scratch memory of one thread.
 class Workspace {
  public:
@@ -50,6 +67,8 @@ class Workspace {
   /// Asked now and then, so that endless walks can be interrupted; once it answers true the block under way is given up and its
   /// samples must not be used.
   std::function<bool()> stop = [] { return false; };
+  /// Where walks are written down; usually nowhere.
+  Recording* recording = nullptr;
 };
 
 /// An estimator with its parameters, compiled for one kind of value.  Immutable; one instance serves all threads.
@@ -74,6 +93,13 @@ class Kernel {
 
   /// Exact moments per channel; empty where the estimator states none.
   virtual std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const = 0;
+
+  /// Whether a sample is one flight through a majorant, so that the laws of collisions apply.
+  virtual bool flies() const = 0;
+
+  /// Per channel, of estimators that are such products.
+  virtual bool states_count_law() const = 0;
+  virtual std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const = 0;
 };
 
 /// An estimator's parameters before it meets a medium.

@@ -47,12 +47,17 @@ struct Measurement {
   bool operator==(const Measurement&) const = default;
 };
 
+/// When the laws of a cell's walks are tested: where its mean is undecidable, or always, or never.
+enum class LawPolicy { undecided, always, never };
+
 /// What a cell's verdict must prove and what that may cost.
 struct GateSpec {
   bool enabled = true;
   std::optional<Real> epsilon{};              ///< relative to the mean reference; left out: by the optical depth, see gate.cpp
   std::uint64_t max_samples_per_ray = 0;      ///< beyond samples_per_ray, where undecided; 0: no further ones
   std::optional<Real> max_lookups_per_ray{};  ///< expected lookups that all samples of a ray may cost
+
+  LawPolicy laws = LawPolicy::undecided;
 
   bool operator==(const GateSpec&) const = default;
 };

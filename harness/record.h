@@ -60,6 +60,14 @@ struct TestRecord {
   Outcome outcome = Outcome::none;
 };
 
+/// A law that walks must follow, as `check` derives its outcome.
+struct LawRecord {
+  std::string name;
+  Real log_e = 0;             ///< evidence against it: log of an e-value, or -log of a probability
+  std::uint64_t samples = 0;  ///< observations
+  Outcome outcome = Outcome::none;
+};
+
 struct VerdictRecord {
   /// Of the mean: against the reference for estimators that claim to be unbiased, else against the mean they predict of
   /// themselves, which proves nothing about T.
@@ -77,6 +85,9 @@ struct VerdictRecord {
   std::uint64_t family = 1, lookups_family = 1;
   Real alpha = 1e-4, alpha_pass = 1e-3;
   std::vector<TestRecord> tests;
+  std::uint64_t laws_family = 1;
+  std::vector<LawRecord> laws;     ///< tested where the mean cannot be decided, or on request
+  Outcome lawful = Outcome::none;  ///< PASS: no law is broken
 };
 
 struct CellRecord {

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "harness/image.h"
+#include "harness/laws.h"
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 #include "harness/sampling.h"
@@ -171,7 +172,7 @@ struct Effort {
 
 /// Sizes of the families that a verdict's levels are shared out over.
 struct Families {
-  std::uint64_t means = 1, lookups = 1;
+  std::uint64_t means = 1, lookups = 1, laws = 1;
 };
 
 /// Variances from samples of their own, where theory has none.
@@ -236,6 +237,12 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
   verdict.variance_basis = gate.variance_basis;
   verdict.family = families.means;
   verdict.lookups_family = families.lookups;
+  verdict.laws_family = families.laws;
+  const LawPolicy policy = prepared.cell->gate.laws;
+  const bool violates = prepared.needs_bound && !bounds_everywhere(*prepared.scene, *prepared.kernel);
+  if (gate.against == "reference" && !violates &&
+      (policy == LawPolicy::always || (policy == LawPolicy::undecided && !gate.undecidable.empty())))
+    verdict.laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop);
   verdict.alpha = levels.alpha;
   verdict.alpha_pass = levels.alpha_pass;
   verdict.planned = gate.planned;
@@ -449,7 +456,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
       if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = record;
 
   const bool timing = options.timing && plan.timing.enabled;
-  const Families families{mean_family(plan), lookups_family(plan)};
+  const Families families{mean_family(plan), lookups_family(plan), laws_family(plan)};
   Effort effort;
   Workshop workshop(plan);
   std::vector<PreparedCell> cells =

@@ -107,10 +107,13 @@ Json definitions() {
   cell["images"] = {{"type", "boolean"}, {"default", false}};
   cell["image_maximum"] = described(positive(), "value shown white");
   cell["gate"] = described(
-      closed_object({{"enabled", {{"type", "boolean"}, {"default", true}}},
-                     {"epsilon", described(positive(), "|bias| that PASS excludes, relative to the mean reference")},
-                     {"max_samples_per_ray", described(whole(0), "drawn while the verdict is open; 0: only samples_per_ray")},
-                     {"max_lookups_per_ray", described(positive(), "expected lookups that all samples of a ray may cost")}}),
+      closed_object(
+          {{"enabled", {{"type", "boolean"}, {"default", true}}},
+           {"epsilon", described(positive(), "|bias| that PASS excludes, relative to the mean reference")},
+           {"max_samples_per_ray", described(whole(0), "drawn while the verdict is open; 0: only samples_per_ray")},
+           {"max_lookups_per_ray", described(positive(), "expected lookups that all samples of a ray may cost")},
+           {"laws", described({{"enum", law_policies()}},
+                              "when the laws of walks are tested: undecided means only where the mean cannot decide")}}),
       "what the verdict must prove and may cost");
   cell["own_streams"] = described({{"type", "boolean"}, {"default", false}},
                                   "random streams keyed by the estimator too, instead of common random numbers");

@@ -56,8 +56,14 @@ Json measurement_json(const Measurement& measurement) {
   return {{"clamp", measurement.clamp}, {"quantise_bits", measurement.quantise_bits}};
 }
 
+const std::vector<std::string>& law_policies() {
+  static const std::vector<std::string> kNames = {"undecided", "always", "never"};
+  return kNames;
+}
+
 Json gate_json(const GateSpec& gate) {
   Json json = {{"enabled", gate.enabled}, {"max_samples_per_ray", gate.max_samples_per_ray}};
+  json["laws"] = law_policies()[static_cast<std::size_t>(gate.laws)];
   if (gate.epsilon) json["epsilon"] = *gate.epsilon;
   if (gate.max_lookups_per_ray) json["max_lookups_per_ray"] = *gate.max_lookups_per_ray;
   return json;

@@ -15,6 +15,8 @@ Json parameters_json(const ParameterValues& values);
 Json component_json(const Component& component);
 Json medium_json(const MediumSpec& medium);
 Json measurement_json(const Measurement& measurement);
+/// In the order of LawPolicy.
+const std::vector<std::string>& law_policies();
 Json gate_json(const GateSpec& gate);
 /// Cells are referred to by name: {"cell": "ratio/linear/global"}.
 Json tables_json(const std::vector<Table>& tables);

@@ -21,7 +21,7 @@ Kind kind_of(const CellRecord& record) {
   if (!record.verdict) return Kind::unclaimed;
   const VerdictRecord& verdict = *record.verdict;
   const Outcome mean = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
-  if (mean == Outcome::fail || verdict.lookups == Outcome::fail) return Kind::fail;
+  if (mean == Outcome::fail || verdict.lookups == Outcome::fail || verdict.lawful == Outcome::fail) return Kind::fail;
   if (mean == Outcome::violated) return Kind::violated;
   if (mean == Outcome::inconclusive) return verdict.planned_undecidable ? Kind::expected_open : Kind::unexpected_open;
   return mean == Outcome::pass ? Kind::pass : Kind::unclaimed;
@@ -60,6 +60,9 @@ std::string reason_of(const CellRecord& record) {
         reason +=
             fmt::format("{}lookups differ from their expectation (log E = {:.1f})", reason.empty() ? "" : "; ", test.log_e_fail);
   }
+  for (const LawRecord& law : verdict.laws)
+    if (law.outcome == Outcome::fail)
+      reason += fmt::format("{}law \"{}\" is broken (log E = {:.1f})", reason.empty() ? "" : "; ", law.name, law.log_e);
   return reason;
 }
 
@@ -93,8 +96,8 @@ Summary summarise(RunRecord& run) {
       const VerdictRecord before = *record.verdict;
       decide(*record.verdict);
       const VerdictRecord& after = *record.verdict;
-      summary.altered +=
-          before.unbiased != after.unbiased || before.own_mean != after.own_mean || before.lookups != after.lookups;
+      summary.altered += before.unbiased != after.unbiased || before.own_mean != after.own_mean ||
+                         before.lookups != after.lookups || before.lawful != after.lawful;
     }
     switch (kind_of(record)) {
       case Kind::pass:

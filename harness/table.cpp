@@ -44,6 +44,7 @@ std::string verdict_word(const CellRecord& record) {
   const VerdictRecord& verdict = *record.verdict;
   std::string word = to_string(verdict.unbiased);
   if (verdict.against == "own mean") word = fmt::format("own mean {}", to_string(verdict.own_mean));
+  if (verdict.lawful == Outcome::fail) word += ", laws FAIL";
   if (verdict.lookups == Outcome::fail) word += ", lookups FAIL";
   return word.empty() ? "-" : word;
 }

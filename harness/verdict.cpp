@@ -42,6 +42,12 @@ void decide(VerdictRecord& verdict) {
     if (test.outcome == Outcome::fail && (!failed || test.log_e_fail > failed->log_e_fail)) failed = &test;
     if (test.outcome == Outcome::inconclusive && !open) open = &test;
   }
+  verdict.lawful = verdict.laws.empty() ? Outcome::none : Outcome::pass;
+  const Real broken = std::log(static_cast<Real>(verdict.laws_family) / verdict.alpha);
+  for (LawRecord& law : verdict.laws) {
+    law.outcome = law.log_e >= broken ? Outcome::fail : Outcome::pass;
+    if (law.outcome == Outcome::fail) verdict.lawful = Outcome::fail;
+  }
   if (!any) {
     outcome = Outcome::none;
   } else if (verdict.violated) {

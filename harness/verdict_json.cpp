@@ -130,6 +130,10 @@ Json verdict_json(const VerdictRecord& verdict) {
     while (i + 1 < verdict.tests.size() && verdict.tests[i + 1].group >= 0) groups.push_back(&verdict.tests[++i]);
     if (!groups.empty()) tests.back()["groups"] = groups_json(groups);
   }
+  Json laws = Json::array();
+  for (const LawRecord& law : verdict.laws)
+    laws.push_back(
+        {{"name", law.name}, {"log_e", real(law.log_e)}, {"samples", law.samples}, {"outcome", outcome_json(law.outcome)}});
   return {{"unbiased", outcome_json(verdict.unbiased)},
           {"own_mean", outcome_json(verdict.own_mean)},
           {"lookups", outcome_json(verdict.lookups)},
@@ -147,7 +151,10 @@ Json verdict_json(const VerdictRecord& verdict) {
           {"lookups_family", verdict.lookups_family},
           {"alpha", verdict.alpha},
           {"alpha_pass", verdict.alpha_pass},
-          {"tests", std::move(tests)}};
+          {"tests", std::move(tests)},
+          {"laws_family", verdict.laws_family},
+          {"laws", std::move(laws)},
+          {"lawful", outcome_json(verdict.lawful)}};
 }
 
 VerdictRecord read_verdict(const Place& place) {
@@ -179,6 +186,11 @@ VerdictRecord read_verdict(const Place& place) {
     verdict.tests.push_back(read_test(test));
     if (test.has("groups")) read_groups(test["groups"], verdict.tests.back().channel, verdict.tests);
   }
+  verdict.laws_family = place["laws_family"].unsigned_integer(1, kAny);
+  for (const Place& law : place["laws"].elements())
+    verdict.laws.push_back({law["name"].string(), read_real(law, "log_e", kInfinity), law["samples"].unsigned_integer(0, kAny),
+                            read_outcome(law["outcome"])});
+  verdict.lawful = read_outcome(place["lawful"]);
   return verdict;
 }
 

@@ -21,6 +21,11 @@ class WrappedKernel : public Kernel {
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
     inner_->sample(workspace, medium, context, key, first, count, quantity, out, counters);
   }
+  bool flies() const override { return inner_->flies(); }
+  bool states_count_law() const override { return inner_->states_count_law(); }
+  std::vector<CountLaw> count_law(const Workspace& workspace, const RayProfile& profile) const override {
+    return inner_->count_law(workspace, profile);
+  }
   Spectrum expected(const Workspace& workspace, const Spectrum& optical_depth, Quantity quantity) const override {
     return inner_->expected(workspace, optical_depth, quantity);
   }

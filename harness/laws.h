@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "harness/gate.h"
+#include "harness/sampling.h"
+
+namespace nullmark {
+
+/// Tests of how walks behave rather than of their mean: they gate optical depths at which no affordable number of samples decides
+/// a mean.  Walks are drawn by the cell's own kernel, with streams of their own, and written down.
+///
+///   count         collisions against the majorant depth that was flown through: a Poisson process of rate 1 up to the stopping
+///   of
+///                 each walk, so (1 + d)^N e^{-d Lambda} has mean 1 for every d, whatever ends a walk
+///   first         depth of the first collision, given one: uniform in 1 - e^{-depth} [Dvoretzky-Kiefer-Wolfowitz, Massart 1990]
+///   positions     depths of all collisions of walks that nothing ends: uniform given their number
+///   mapping       the majorant integrated from the ray's begin to each lookup is the depth the flight says
+///   conditional   E[X | K = k] and its variance, of products (CountLaw)
+///   independence  first flights of consecutive samples, and of neighbouring rays, are uncorrelated
+///   replay        a sample drawn alone is bit for bit the one drawn among others
+///   variance      (X - T)^2 has the mean that theory states
+///   segments      the ray cut into pieces shallow enough for mean tests of their own
+///
+/// Returns log E (or -log p) of each law that applies; a law that holds exceeds log(1/a) with probability at most a.
+struct LawBudget {
+  Real lookups = 2e5;                 ///< of all walks together, about
+  std::uint64_t most_per_ray = 4096;  ///< samples
+};
+std::vector<LawRecord> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleRange range,
+                                 const CellTheory& theory, const LawBudget& budget, const std::function<bool()>& stop);
+
+}  // namespace nullmark
