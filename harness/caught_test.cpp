@@ -62,7 +62,7 @@ std::string told(const CellRecord& record) {
 }
 
 TEST(Caught, EveryPlantedBugByTheCheckItNames) {
-  const auto records = run_all(1, R"({"max_samples_per_ray":4000000,"laws":"always"})");
+  const auto records = run_all(1, R"({"max_samples_per_ray":10000000,"laws":"always"})");
   for (const CellRecord& record : records) {
     const EstimatorEntry& bug = *Registry<EstimatorEntry>::instance().find(record.cell.estimator.type);
     EXPECT_TRUE(caught(record, bug.caught_by)) << bug.name << " by " << bug.caught_by << ": " << told(record);

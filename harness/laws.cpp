@@ -125,7 +125,9 @@ class LawTester {
  private:
   void begin(std::size_t ray, const Workspace& workspace) {
     laws_.clear();
-    if (cell_.quantity == Quantity::transmittance && kernel_.states_count_law())
+    // With many collisions no count comes often enough.
+    constexpr Real kMostCollisions = 500;
+    if (cell_.quantity == Quantity::transmittance && kernel_.states_count_law() && theory_.lookups.value_or(0) < kMostCollisions)
       laws_ = kernel_.count_law(workspace, profile_of(ray));
     by_count_.emplace_back();
 
@@ -312,10 +314,16 @@ Scene in_pieces(const Scene& scene, const std::vector<std::size_t>& rays) {
 std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleRange range,
                                       const CellTheory& theory, const std::vector<std::size_t>& rays, const LawBudget& budget,
                                       const std::function<bool()>& stop) {
-  const Scene pieces = in_pieces(scene, rays);
+  // The theory of a piece costs as much as its majorant is deep; some of the rays do where that is much.
+  constexpr Real kDeepest = 4000;
+  const auto some = static_cast<std::size_t>(
+      std::clamp<Real>(kDeepest / std::max<Real>(1, theory.lookups.value_or(1)), 1, static_cast<Real>(rays.size())));
+  std::vector<std::size_t> taken;
+  for (std::size_t i = 0; i < some; ++i) taken.push_back(rays[i * rays.size() / some]);
+  const Scene pieces = in_pieces(scene, taken);
   const std::vector<CellTheory> all = compute_theory(pieces, {&kernel}, {cell.quantity});
   if (all[0].ray_variance.empty()) return std::nullopt;
-  const Real each = std::max<Real>(1, theory.lookups.value_or(1)) * static_cast<Real>(rays.size());
+  const Real each = std::max<Real>(1, theory.lookups.value_or(1)) * static_cast<Real>(taken.size());
   std::uint64_t samples = 16;
   while (samples < budget.most_per_ray && static_cast<Real>(2 * samples) * each <= budget.lookups) samples *= 2;
   Cell own = cell;

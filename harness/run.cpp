@@ -492,6 +492,11 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
         record.reason = "interrupted";
       } else {
         fill_statistics(record, prepared, *sampled);
+        if (record.status == Status::ok && verdict && verdict->nonfinite > 0) {
+          record.status = Status::error;
+          record.nonfinite += verdict->nonfinite;
+          record.reason = fmt::format("{} samples are not finite, among those drawn for the verdict", verdict->nonfinite);
+        }
         if (record.status == Status::ok) record.verdict = verdict;
         write_images(record, prepared, *sampled, options, observer);
         if (record.status == Status::ok) to_time.push_back(&prepared);

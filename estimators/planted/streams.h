@@ -12,20 +12,13 @@ class PairedStreams final : public WrappedKernel {
 
   void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
-    const std::size_t evens = (count + 1 - first % 2) / 2, odds = count - evens;
-    SampleBlock even, odd;
-    WrappedKernel::sample(workspace, medium, context, key, (first + 1) / 2, evens, quantity, even, counters);
-    WrappedKernel::sample(workspace, medium, context, key, first / 2, odds, quantity, odd, counters);
-    const std::size_t channels = count > 0 ? (even.values.size() + odd.values.size()) / count : 0;
-    out.values.resize(count * channels);
-    out.lookups.resize(count);
-    std::size_t e = 0, o = 0;
+    out.values.clear();
+    out.lookups.clear();
+    SampleBlock one;
     for (std::size_t i = 0; i < count; ++i) {
-      const bool is_even = (first + i) % 2 == 0;
-      const SampleBlock& from = is_even ? even : odd;
-      const std::size_t at = is_even ? e++ : o++;
-      out.lookups[i] = from.lookups[at];
-      std::copy_n(&from.values[at * channels], channels, &out.values[i * channels]);
+      WrappedKernel::sample(workspace, medium, context, key, (first + i) / 2, 1, quantity, one, counters);
+      out.values.insert(out.values.end(), one.values.begin(), one.values.end());
+      out.lookups.push_back(one.lookups[0]);
     }
   }
 };
