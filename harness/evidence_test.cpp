@@ -82,7 +82,7 @@ TEST(Evidence, AFactorIsWorthAtMostOne) {
     for (const int side : {-1, 1}) {
       EXPECT_NEAR(worth({Bet::Kind::betting, side, 0, 0, {rate}}), 1, 1e-14);
       EXPECT_LT(worth({Bet::Kind::betting, side, 0.1 * side, 0, {rate}}), 1);
-      EXPECT_LE(worth({Bet::Kind::catoni, side, 0, 9, {rate}}), 1);
+      EXPECT_LE(worth({Bet::Kind::catoni, side, 0, 9, {rate}}), 1 + 1e-14);
       EXPECT_GT(worth({Bet::Kind::catoni, side, 0, 9, {rate}}), 1 - 40 * rate * rate * rate * 81);
       EXPECT_GT(worth({Bet::Kind::betting, side, -0.1 * side, 0, {rate}}), 1) << "a claim that is wrong loses";
     }
