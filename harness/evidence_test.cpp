@@ -47,7 +47,7 @@ void expect_plain(const Bet& bet, const std::vector<Real>& sums, int together = 
 }
 
 TEST(Evidence, IsTheProductOverSingleErrors) {
-  for (const std::size_t count : {1, 2, 63, 64, 65, 2047, 2048, 2049, 10000})
+  for (const std::size_t count : {1u, 2u, 63u, 64u, 65u, 2047u, 2048u, 2049u, 10000u})
     for (const int side : {-1, 1}) {
       expect_plain({Bet::Kind::betting, side, 0, 0, {1e-6, 0.01, 0.3, 0.5}}, uniforms(count, -1, 1));
       expect_plain({Bet::Kind::betting, side, 0.02 * side, 0, {1e-6, 0.01, 0.3, 0.5}}, uniforms(count, -0.1, 1));
@@ -125,7 +125,7 @@ TEST(Evidence, NothingIsWorthNothing) {
 /// worst.
 TEST(Evidence, HugeErrorsAreFinite) {
   for (const Bet::Kind kind : {Bet::Kind::betting, Bet::Kind::catoni})
-    for (const std::size_t count : {1, 64, 5000}) {
+    for (const std::size_t count : {1u, 64u, 5000u}) {
       const Bet up{kind, 1, 0, 1, {1e-3, 0.5}};
       for (const Real huge : {1e10, 1e155, 1e300, kMost}) {
         const std::vector<Real> won = bet_on(up, std::vector<Real>(count, huge), 1);
