@@ -253,15 +253,15 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
 
   for (std::size_t i = 0; i < gate.tests.size(); ++i) {
     MeanTest& test = gate.tests[i];
+    if (test.reference_error > 0.25 * test.epsilon)
+      gate.undecidable =
+          fmt::format("the reference's own error {:.2g} is too coarse for epsilon {:.2g}", test.reference_error, test.epsilon);
     if (test.deterministic || test.bets.empty()) continue;
     clip_rates(test, pools[i], gate.low, gate.high, gate.errors_per_sum);
     test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), test.rays);
     gate.planned = std::max(gate.planned, test.planned);
     const Real mean = std::abs(pools[i].mean);
-    if (test.reference_error > 0.25 * test.epsilon)
-      gate.undecidable =
-          fmt::format("the reference's own error {:.2g} is too coarse for epsilon {:.2g}", test.reference_error, test.epsilon);
-    else if (kPatience * test.planned > gate.affordable && test.planned > cell.samples_per_ray && gate.undecidable.empty())
+    if (kPatience * test.planned > gate.affordable && test.planned > cell.samples_per_ray && gate.undecidable.empty())
       gate.undecidable =
           fmt::format("PASS at epsilon {:.2g} needs about {:.2g} samples a ray (relative variance {:.2g}); {} are allowed",
                       test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean), gate.affordable);

@@ -54,7 +54,8 @@ Ending ending(const CellRecord& record) {
   if (verdict.lookups == Outcome::fail) return {"failure", "FAIL: lookups differ from their expectation"};
   if (verdict.unbiased == Outcome::inconclusive || verdict.own_mean == Outcome::inconclusive)
     return {"skipped", "INCONCLUSIVE: " + verdict.reason};
-  if (verdict.unbiased == Outcome::violated) return {"skipped", "VIOLATED: " + verdict.reason};
+  if (verdict.unbiased == Outcome::violated || verdict.own_mean == Outcome::violated)
+    return {"skipped", "VIOLATED: " + verdict.reason};
   return {};
 }
 

@@ -16,10 +16,11 @@ struct OrderFit {
   std::string reason;
 };
 
-/// log |bias| against log(1/steps), weighted by the biases' standard errors.  Only biases beyond 4 standard errors and 10 times
-/// the reference's error count; fewer than three of them resolve no order.  FAIL: the whole interval lies below the claim by more
-/// than a quarter; PASS: none of it does.  (A bias that vanishes faster than claimed is no fault: midpoints are exact on linear
-/// media.)
+/// log |bias| against log(1/steps), weighted by the biases' standard errors; of T the bias is that of the optical depth,
+/// log(mean/T).  Only biases beyond 4 standard errors and 10 times the reference's error count; fewer than three step counts of
+/// them resolve no order, nor do biases that follow no power law.  FAIL: the whole interval lies below the claim by more than a
+/// quarter; PASS: none of it does.  (A bias that vanishes faster than claimed is no fault: midpoints are exact on linear media.)
+/// Measured cells (clamped, quantised) claim no order.
 std::vector<OrderFit> fit_orders(const std::vector<CellRecord>& cells);
 
 }  // namespace nullmark

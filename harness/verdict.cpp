@@ -17,15 +17,16 @@ std::string place_of(const TestRecord& test) {
 }  // namespace
 
 Outcome decide(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
-  if (test.basis == "deterministic")
-    return test.largest_error <= test.rounding + test.reference_error ? Outcome::pass : Outcome::fail;
-  if (test.log_e_fail >= -std::log(alpha_fail)) return Outcome::fail;
+  const bool deterministic = test.basis == "deterministic";
+  if (deterministic ? !(test.largest_error <= test.rounding + test.reference_error) : test.log_e_fail >= -std::log(alpha_fail))
+    return Outcome::fail;
   const Real needed = -std::log(alpha_pass);
-  const bool proven = test.log_e_low >= needed && test.log_e_high >= needed;
+  const bool proven = deterministic || (test.log_e_low >= needed && test.log_e_high >= needed);
   return proven && test.reference_error <= 0.25 * test.epsilon ? Outcome::pass : Outcome::inconclusive;
 }
 
 void decide(VerdictRecord& verdict) {
+  verdict.unbiased = verdict.own_mean = Outcome::none;
   Outcome& outcome = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
   const Real alpha = verdict.alpha / static_cast<Real>(verdict.family);
   const Real alpha_lookups = verdict.alpha / static_cast<Real>(verdict.lookups_family);
@@ -70,7 +71,7 @@ void decide(VerdictRecord& verdict) {
     outcome = Outcome::inconclusive;
     if (!verdict.planned_undecidable)
       verdict.reason = fmt::format("{}: undecided after {} samples a ray; {} were planned", place_of(*open),
-                                   verdict.samples_per_ray, open->planned);
+                                   verdict.samples_per_ray, verdict.planned);
   } else {
     outcome = Outcome::pass;
     verdict.reason.clear();
