@@ -19,6 +19,9 @@ constexpr Real kFailRates[] = {0.4, 1.5}, kPassRates[] = {0.5, 0.9};
 /// Catoni's variance bound over the known variance: quadrature slack, and what PASS concedes ("given Var <= 1.25 sigma^2").
 constexpr Real kFailSlack = 1.02, kPassSlack = 1.25, kPilotSlack = 2;
 
+/// Where the standard deviation is a millionth of rounding, no sample in 10^12 shows it, whatever its law [Chebyshev].
+constexpr Real kSurely = 1e-12;
+
 /// A pilot variance is trusted for unbounded samples only below this variance of the variance.
 constexpr Real kTrustedVariance = 0.02;
 
@@ -232,7 +235,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
       test.rounding = 64 * kUlp * (1 + mean_lookups + depth) *
                       std::max(std::abs(pool.most),
                                std::abs(pool.least));  // Rare events that a pilot did not see are no proof of a zero variance.
-      test.deterministic = analytic && !(test.variance > test.rounding * test.rounding);
+      test.deterministic = analytic && !(test.variance > kSurely * test.rounding * test.rounding);
       if (!analytic && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
       // Far below epsilon a variance decides nothing, and theory's may be rounding.
       if (!test.deterministic) test.variance = std::max(test.variance, test.epsilon * test.epsilon / 4);
@@ -295,7 +298,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
     test.reference_error = kTheoryError * pool.mean / n;
     test.variance = pool.variance / n;
     test.rounding = test.reference_error;
-    test.deterministic = !(test.variance > test.rounding * test.rounding);
+    test.deterministic = !(test.variance > kSurely * test.rounding * test.rounding);
     if (test.deterministic) {
       test.basis = "deterministic";
     } else {

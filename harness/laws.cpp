@@ -323,7 +323,8 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
   const Scene pieces = in_pieces(scene, taken);
   const std::vector<CellTheory> all = compute_theory(pieces, {&kernel}, {cell.quantity});
   if (all[0].ray_variance.empty()) return std::nullopt;
-  const Real each = std::max<Real>(1, theory.lookups.value_or(1)) * static_cast<Real>(taken.size());
+  // Every piece starts anew, however early a walk of the whole ray would end.
+  const Real each = (1 + all[0].lookups.value_or(1)) * static_cast<Real>(pieces.rays->world.size());
   std::uint64_t samples = 16;
   while (samples < budget.most_per_ray && static_cast<Real>(2 * samples) * each <= budget.lookups) samples *= 2;
   Cell own = cell;
