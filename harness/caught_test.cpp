@@ -73,6 +73,19 @@ TEST(Caught, EveryPlantedBugByTheCheckItNames) {
   EXPECT_EQ(records.size(), std::size(kPlantedScenes));
 }
 
+/// At its default the bug shows once in a million samples: so many are drawn.
+TEST(Caught, NanOnceInAMillion) {
+  const Plan plan = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"nan",
+      "rays":"single","samples_per_ray":30000000,"gate":{"enabled":false},
+      "matrix":{"estimator":"planted_nan","medium":{"type":"homogeneous","extinction":1}}}]})",
+                                "nan.json");
+  RunOptions options;
+  options.timing = false;
+  const CellRecord record = run_plan(plan, {true}, {}, options, {}).at(0);
+  EXPECT_EQ(record.status, Status::error);
+  EXPECT_GT(record.nonfinite, 0u);
+}
+
 TEST(Caught, NoBiasedBugPassesAtAnyOfAHundredSeeds) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed)
     for (const CellRecord& record : run_all(seed, R"({"max_samples_per_ray":200000,"laws":"never"})")) {

@@ -17,6 +17,7 @@
 #include "harness/junit.h"
 #include "harness/merge.h"
 #include "harness/provenance.h"
+#include "harness/registry.h"
 #include "harness/results_json.h"
 #include "harness/schema.h"
 #include "harness/summary.h"
@@ -214,8 +215,19 @@ class CommandLine {
   bool force_ = false;
 };
 
+/// Cells of two trackers of one name could not be told apart.
+template <class Entry>
+void refuse_shared_names(const char* what) {
+  const std::string& name = Registry<Entry>::instance().taken_twice();
+  if (!name.empty())
+    throw InputError(fmt::format("two {} are registered as \"{}\"; give the plug-in's another name", what, name));
+}
+
 ExitCode guarded(int argc, char** argv) {
   try {
+    refuse_shared_names<EstimatorEntry>("estimators");
+    refuse_shared_names<MediumEntry>("media");
+    refuse_shared_names<MajorantEntry>("majorants");
     return CommandLine(argc, argv).execute();
   } catch (const InputError& error) {
     return report(ExitCode::input_error, error.what());

@@ -4,6 +4,7 @@
 
 #include <string_view>
 
+#include "harness/order.h"
 #include "harness/results_json.h"
 #include "harness/verdict_json.h"
 
@@ -85,8 +86,23 @@ std::string junit(const RunRecord& run, const std::string& file) {
     cases += fmt::format(">\n      <{0} message=\"{1}\">{2}</{0}>\n    </testcase>\n", element, xml(end.message),
                          xml(reproduction(record, file)));
   }
-  const std::string counts =
-      fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\"", run.cells.size(), failures, errors, skipped);
+  std::size_t orders = 0;
+  for (const OrderFit& fit : fit_orders(run.cells)) {
+    ++orders;
+    const bool failed = fit.outcome == Outcome::fail;
+    const char* element = failed ? "failure" : "skipped";
+    cases += fmt::format("    <testcase classname=\"convergence order\" name=\"{}\"", xml(fit.name));
+    if (fit.outcome == Outcome::pass) {
+      cases += "/>\n";
+      continue;
+    }
+    ++(failed ? failures : skipped);
+    const std::string message =
+        failed ? fmt::format("claimed {:.0f}, measured {:.3f} +- {:.3f}", fit.claimed, fit.order, fit.half_width) : fit.reason;
+    cases += fmt::format(">\n      <{0} message=\"{1}\"/>\n    </testcase>\n", element, xml(message));
+  }
+  const std::string counts = fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\"", run.cells.size() + orders,
+                                         failures, errors, skipped);
   return fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites {0}>\n  <testsuite name=\"{1}\" {0}>\n{2}  "
       "</testsuite>\n</testsuites>\n",

@@ -78,6 +78,13 @@ std::string order_line(const OrderFit& fit) {
                      fit.outcome == Outcome::inconclusive ? fit.reason : to_string(fit.outcome));
 }
 
+/// For a cell of a markdown table.
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) result += c == '|' ? "\\|" : std::string(1, c);
+  return result;
+}
+
 std::string families(const RunRecord& run) {
   for (const CellRecord& record : run.cells)
     if (record.verdict)
@@ -156,7 +163,7 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
     std::size_t count = 0;
     for (const CellRecord& record : run.cells)
       if (std::find(kinds.begin(), kinds.end(), kind_of(record)) != kinds.end()) {
-        rows += fmt::format("| {} | {} | {} |\n", word(kind_of(record)), record.cell.name, reason_of(record));
+        rows += fmt::format("| {} | {} | {} |\n", word(kind_of(record)), escaped(record.cell.name), escaped(reason_of(record)));
         if (commands) rows += fmt::format("| | | `{}` |\n", reproduction(record, file));
         ++count;
       }

@@ -21,6 +21,7 @@ class Registry {
   }
 
   bool add(Entry entry) {
+    if (find(entry.name)) taken_ = entry.name;
     const auto at = std::lower_bound(entries_.begin(), entries_.end(), entry,
                                      [](const Entry& a, const Entry& b) { return std::string_view(a.name) < b.name; });
     entries_.insert(at, std::move(entry));
@@ -33,11 +34,15 @@ class Registry {
     return nullptr;
   }
 
+  /// A name that two entries claim, as when a plug-in takes one of the tree's; empty where there is none.
+  const std::string& taken_twice() const { return taken_; }
+
   /// Sorted by name.
   const std::vector<Entry>& entries() const { return entries_; }
 
  private:
   std::vector<Entry> entries_;
+  std::string taken_;
 };
 
 /// A data file that is not there.  Cells of media that were declared optional are skipped with this reason; otherwise exit
