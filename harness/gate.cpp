@@ -254,6 +254,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
     gate.affordable = std::min(most, static_cast<std::uint64_t>(std::min(9e15, *cell.gate.max_lookups_per_ray / mean_lookups)));
   gate.affordable = std::max(gate.affordable, cell.samples_per_ray);
 
+  std::optional<std::size_t> hardest;
   for (std::size_t i = 0; i < gate.tests.size(); ++i) {
     MeanTest& test = gate.tests[i];
     if (test.reference_error > 0.25 * test.epsilon)
@@ -263,11 +264,16 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
     clip_rates(test, pools[i], gate.low, gate.high, gate.errors_per_sum);
     test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), test.rays);
     gate.planned = std::max(gate.planned, test.planned);
-    const Real mean = std::abs(pools[i].mean);
-    if (kPatience * test.planned > gate.affordable && test.planned > cell.samples_per_ray && gate.undecidable.empty())
-      gate.undecidable =
-          fmt::format("PASS at epsilon {:.2g} needs about {:.2g} samples a ray (relative variance {:.2g}); {} are allowed",
-                      test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean), gate.affordable);
+    if (!hardest || test.planned > gate.tests[*hardest].planned) hardest = i;
+  }
+  if (hardest && gate.undecidable.empty()) {
+    const MeanTest& test = gate.tests[*hardest];
+    const Real mean = std::abs(pools[*hardest].mean);
+    if (kPatience * test.planned > gate.affordable && test.planned > cell.samples_per_ray)
+      gate.undecidable = fmt::format(
+          "PASS at epsilon {:.2g} needs about {:.2g} samples a ray (relative variance {:.2g}) and room for {} times as many; {} "
+          "are allowed",
+          test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean), kPatience, gate.affordable);
   }
   if (distrusted)
     gate.undecidable = fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "harness/json_input.h"
 #include "harness/junit.h"
 #include "harness/results_json.h"
 #include "harness/verdict.h"
@@ -78,6 +79,16 @@ std::string order_line(const OrderFit& fit) {
                      fit.outcome == Outcome::inconclusive ? fit.reason : to_string(fit.outcome));
 }
 
+/// The configuration in the results names every cell, whatever a filter, a shard or a time budget left of them.
+std::size_t configured_cells(const RunRecord& run) {
+  const Json config = Json::parse(run.config_text, nullptr, false);
+  std::size_t cells = 0;
+  if (config.is_object() && config.contains("experiments"))
+    for (const Json& experiment : config["experiments"])
+      if (experiment.is_object() && experiment.contains("include")) cells += experiment["include"].size();
+  return cells;
+}
+
 /// For a cell of a markdown table.
 std::string escaped(const std::string& text) {
   std::string result;
@@ -132,6 +143,9 @@ Summary summarise(RunRecord& run) {
         ++summary.unclaimed;
     }
   }
+  for (const CellRecord& record : run.cells) summary.never_started += record.status == Status::not_run;
+  const std::size_t configured = configured_cells(run);
+  if (configured > run.cells.size()) summary.never_started += configured - run.cells.size();
   summary.orders = fit_orders(run.cells);
   const bool order_failed =
       std::any_of(summary.orders.begin(), summary.orders.end(), [](const OrderFit& fit) { return fit.outcome == Outcome::fail; });
@@ -141,7 +155,7 @@ Summary summarise(RunRecord& run) {
     summary.exit = ExitCode::internal_error;
   else if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0)
     summary.exit = ExitCode::nothing_ran;
-  else if (summary.unexpected_open > 0 || summary.pass + summary.violated == 0)
+  else if (summary.never_started > 0 || summary.unexpected_open > 0 || summary.pass + summary.violated == 0)
     summary.exit = ExitCode::inconclusive;
   return summary;
 }
@@ -152,6 +166,7 @@ std::string summary_text(const RunRecord& run, const Summary& summary) {
     for (const CellRecord& record : run.cells)
       if (kind_of(record) == kind) text += fmt::format("{}: {}: {}\n", word(kind), record.cell.name, reason_of(record));
   for (const OrderFit& fit : summary.orders) text += fmt::format("ORDER: {}\n", order_line(fit));
+  if (summary.never_started > 0) text += fmt::format("{} cells of the configuration were never started\n", summary.never_started);
   if (summary.altered > 0) text += fmt::format("{} verdicts in the file are not what its figures say\n", summary.altered);
   return text + fmt::format("{}\n{}\n", counts(summary), families(run));
 }

@@ -11,13 +11,14 @@ namespace nullmark {
 /// What `check` concludes of a run, every verdict derived anew from the figures in the record.
 struct Summary {
   std::size_t pass = 0, fail = 0, expected_open = 0, unexpected_open = 0, violated = 0, errors = 0, not_run = 0, unclaimed = 0;
+  std::size_t never_started = 0;  ///< interrupted, out of time, or absent from the file though the configuration has them
   std::size_t altered = 0;  ///< verdicts in the file that its own figures do not bear out
   std::vector<OrderFit> orders;
   ExitCode exit = ExitCode::ok;
 };
 
 /// Decides all verdicts again, in place, and counts them.  Exit code: FAIL 3; else errors 1; else nothing judged 5; else verdicts
-/// that are open although the plan foresaw a decision 77; else 0.
+/// that are open although the plan foresaw a decision, cells never started, or nothing decided at all 77; else 0.
 Summary summarise(RunRecord& run);
 
 /// For the terminal: counts, then every cell that did not pass with its reason.

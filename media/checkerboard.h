@@ -7,14 +7,14 @@
 namespace nullmark {
 
 /// Cells of two extinctions in turn, 1/length, in all three directions: cell (i, j, k) has extinction_a where i + j + k is even.
-/// Jumps everywhere, the hard case of marching, bounds and grids (theory.md section 9).
+/// Jumps everywhere, the hard case of marching, bounds and grids.
 ///
 /// Cells that a box covers by no more than rounding are left out of its bounds: otherwise a majorant grid aligned with the
 /// cells would bound each by its neighbours as well.
 struct Checkerboard {
   static constexpr const char* kName = "checkerboard";
   static constexpr const char* kSummary = "cells of two extinctions in turn in three dimensions";
-  static constexpr const char* kSource = "theory.md section 9, steps and empty cells";
+  static constexpr const char* kSource = "";
 
   std::array<int, 3> cells = {8, 8, 8};
   Real even = 2, odd = 0;

@@ -7,7 +7,7 @@
 namespace nullmark {
 
 /// f(s) = 1 + cos(frequency s + phase), 1/length, in [0,2]; s in [0,1], frequency and phase in radians.  The oscillating profile
-/// of Georgiev et al. 2019; theory.md uses frequency 20, phase 0.8.
+/// of Georgiev et al. 2019.
 struct CosineProfile {
   static constexpr const char* kName = "cosine";
   static constexpr const char* kSummary = "extinction oscillating between 0 and a peak along an axis";

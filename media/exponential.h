@@ -9,7 +9,7 @@ namespace nullmark {
 struct ExponentialProfile {
   static constexpr const char* kName = "exponential";
   static constexpr const char* kSummary = "extinction growing or decaying exponentially along an axis";
-  static constexpr const char* kSource = "theory.md section 3.3, the field of the marching orders";
+  static constexpr const char* kSource = "";
 
   Real amplitude = 3, rate = -3;
 

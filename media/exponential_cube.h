@@ -6,12 +6,12 @@
 namespace nullmark {
 
 /// f(s) = -ln x, 1/length, x = x0 + s (x1 - x0) in [0,1]: rays perpendicular to the axis have the transmittance T = x^d, so one
-/// image shows all transmittances from x0 to x1 (the test scene of seed 004).  At x = 0 the extinction is unbounded: lookups
-/// there see the smallest normal double in place of x (mu = 708.4), bounds over boxes that touch it are +infinity.
+/// image shows all transmittances from x0 to x1 (the test scene of Kozelj's comparison).  At x = 0 the extinction is unbounded:
+/// lookups there see the smallest normal double in place of x (mu = 708.4), bounds over boxes that touch it are +infinity.
 struct ExponentialCubeProfile {
   static constexpr const char* kName = "exponential_cube";
   static constexpr const char* kSummary = "extinction -ln x: rays perpendicular to the axis have the transmittance x^d";
-  static constexpr const char* kSource = "seed 004, exponential cube";
+  static constexpr const char* kSource = "Kozelj, Comparison of transmittance and distance estimators";
 
   Real x0 = 0, x1 = 1;
 

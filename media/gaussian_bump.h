@@ -51,7 +51,7 @@ struct Bell {
 };
 
 /// f(s) = amplitude exp(-(s - center)^2 / (2 sigma^2)), 1/length: a thin cloud layer in vacuum, the sparse profile of Georgiev et
-/// al. 2019; theory.md uses center 0.32, sigma 0.05.
+/// al. 2019.
 struct GaussianBumpProfile {
   static constexpr const char* kName = "gaussian_bump";
   static constexpr const char* kSummary = "Gaussian layer along an axis, nearly empty elsewhere";

@@ -5,7 +5,7 @@
 namespace nullmark {
 
 /// f(s) = level - depth exp(-(s - center)^2 / (2 sigma^2)), 1/length, 0 <= depth <= level: a dense medium with a thin gap
-/// (Georgiev et al. 2019); theory.md uses center 0.32, sigma 0.05.
+/// (Georgiev et al. 2019).
 struct GaussianHoleProfile {
   static constexpr const char* kName = "gaussian_hole";
   static constexpr const char* kSummary = "constant extinction with a Gaussian hole along an axis";

@@ -5,14 +5,14 @@
 namespace nullmark {
 
 /// Piecewise constant along an axis: f(s) = values[i], 1/length, for edges[i-1] <= s < edges[i], edges in (0,1), equally spaced
-/// unless given.  One step, slabs with vacuum between, thin shells (theory.md section 9).
+/// unless given.  One step, slabs with vacuum between, thin shells.
 ///
 /// Layers that a box covers by no more than rounding are left out of its bounds: otherwise a majorant grid aligned with the
 /// layers would bound each by its neighbours as well.
 struct LayersProfile {
   static constexpr const char* kName = "layers";
   static constexpr const char* kSummary = "piecewise constant layers along an axis";
-  static constexpr const char* kSource = "theory.md section 9, steps and empty cells";
+  static constexpr const char* kSource = "";
 
   std::vector<Real> values = {0.5, 2, 0, 1};
   std::vector<Real> edges;
