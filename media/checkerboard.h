@@ -14,7 +14,7 @@ namespace nullmark {
 struct Checkerboard {
   static constexpr const char* kName = "checkerboard";
   static constexpr const char* kSummary = "cells of two extinctions in turn in three dimensions";
-  static constexpr const char* kSource = "";
+  static constexpr const char* kSource = "a test field of this project";
 
   std::array<int, 3> cells = {8, 8, 8};
   Real even = 2, odd = 0;

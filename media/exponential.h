@@ -9,7 +9,7 @@ namespace nullmark {
 struct ExponentialProfile {
   static constexpr const char* kName = "exponential";
   static constexpr const char* kSummary = "extinction growing or decaying exponentially along an axis";
-  static constexpr const char* kSource = "";
+  static constexpr const char* kSource = "a test field of this project";
 
   Real amplitude = 3, rate = -3;
 

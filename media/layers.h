@@ -12,7 +12,7 @@ namespace nullmark {
 struct LayersProfile {
   static constexpr const char* kName = "layers";
   static constexpr const char* kSummary = "piecewise constant layers along an axis";
-  static constexpr const char* kSource = "";
+  static constexpr const char* kSource = "a test field of this project";
 
   std::vector<Real> values = {0.5, 2, 0, 1};
   std::vector<Real> edges;
