@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "estimators/event.h"
 #include "estimators/flight.h"
 #include "estimators/ray_profile.h"
 #include "media/majorants/majorant.h"
@@ -51,6 +52,8 @@ struct Passage {
   std::vector<Real> knots;           ///< sorted, begin and end included; only for estimators with kNeedsKnots
   std::optional<int> degree;         ///< of the extinction between knots
   Vec3 entry = Vec3::Zero();         ///< world point at `begin`
+  Value albedo;                      ///< mu_s / mu, in [0, 1]; 0 where nothing scatters
+  bool draws_absorption = true;      ///< false: absorption is left to weights (E[w; collision] = mu_s T dt), since nothing emits
 
   Real length() const { return end - begin; }
   Value value(Real x) const { return uniform_value<Value>(channels, x); }
@@ -76,6 +79,8 @@ struct Passage {
 //   Real order(Quantity) const                              of a consistent estimator: |bias| ~ h^order
 //   using Ray = ...; void prepare(Ray&) const               per-ray data of its own, derived from Passage<Value>
 //   Value optical_depth(const Walk&, const Ray&) const      answers Quantity::optical_depth as well
+//   Event<Value> event(const Walk&, const Ray&) const       how the flight ended: answers Quantity::free_path, drives paths
+//   bool samples_events(int channels) const                 false where there is no event for so many channels; default true
 //   Value expected(const Value& tau, const Ray&) const      a target other than exp(-tau), e.g. a factor of T
 //   bool flies_once(int channels) const                     false where a sample is several flights; default true
 //   int real_collisions(const Walk&, const Ray&) const      tentative collisions that ended a walk; default 0

@@ -92,6 +92,7 @@ class BlockKernel final : public Kernel {
     ray.knots.assign(context.knots.begin(), context.knots.end());
     ray.degree = medium.polynomial_degree();
     ray.entry = context.world.at(context.world.begin);
+    ray.albedo = context.albedo.size() > 0 ? load<Value>(context.albedo.data(), channels_) : ray.value(0);
     if constexpr (requires { estimator_.prepare(ray); }) estimator_.prepare(ray);
   }
 

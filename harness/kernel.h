@@ -18,6 +18,7 @@ struct RayContext {
   SegmentBuffer segments;
   std::vector<Real> knots;              ///< sorted, with begin and end; filled only when the kernel needs them
   std::optional<Spectrum> exact_depth;  ///< filled only when the kernel needs it
+  Spectrum albedo;                      ///< mu_s / mu per channel; empty: 0
 };
 
 /// Results of a block of samples of one ray.

@@ -35,6 +35,7 @@ BuiltMedium build_medium(const MediumSpec& spec) {
   built.medium = build_field(spec);
   const Box box = built.medium->bounds();
   built.extrema = built.medium->extrema(box);
+  built.albedo = Spectrum::Zero(built.medium->channels());
   const Affine to_world = built.medium->world_to_local().inverse();
   built.world_bounds = {Vec3::Constant(kInfinity), Vec3::Constant(-kInfinity)};
   for (int corner = 0; corner < 8; ++corner) {
@@ -147,6 +148,7 @@ void Scene::context(std::size_t ray, const Kernel& kernel, RayContext& out) cons
   out.world = rays->world[ray];
   out.local = rays->local[ray];
   out.index = static_cast<std::uint32_t>(ray);
+  out.albedo = medium->albedo;
   majorant->segments(out.world, out.local, out.segments);
   out.knots.clear();
   out.exact_depth.reset();

@@ -14,6 +14,7 @@ namespace nullmark {
 struct BuiltMedium {
   std::shared_ptr<const Medium> medium;
   Extrema extrema;
+  Spectrum albedo;  ///< mu_s / mu per channel
   Box world_bounds;
   std::uint64_t hash = 0;  ///< of the specification and of the data behind it
 };
