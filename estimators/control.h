@@ -51,12 +51,25 @@ struct ControlChoice {
 /// The control as one ray sees it.
 template <class Value>
 struct Control {
-  std::vector<Value> of_segment;  ///< constant in each segment; unused for profiles
+  std::vector<Value> of_segment;    ///< constant in each segment; unused for profiles
+  std::vector<Value> depth_before;  ///< tau_c from the ray's begin to each segment
+  std::vector<Real> segment_begin;
   bool linear = false, exponential_profile = false;
   Real begin = 0, length = 0, first = 0,
        growth = 0;  ///< profile: first + growth s, or first e^{growth s}, s = (t - begin)/length
   int channels = 1;
   Value depth;  ///< tau_c over the ray
+
+  /// tau_c from the ray's begin to a distance t on it, in closed form.
+  Value depth_to(Real t) const {
+    const Real s = (t - begin) / length;
+    if (linear) return uniform_value<Value>(channels, length * s * (first + growth * s / 2));
+    if (exponential_profile)
+      return uniform_value<Value>(channels, length * first * (growth == 0 ? s : std::expm1(growth * s) / growth));
+    const auto after = std::upper_bound(segment_begin.begin() + 1, segment_begin.end(), t);
+    const auto segment = static_cast<std::size_t>(after - segment_begin.begin()) - 1;
+    return depth_before[segment] + of_segment[segment] * (t - segment_begin[segment]);
+  }
 
   Value at(Real t, std::size_t segment) const {
     if (!linear && !exponential_profile) return of_segment[segment];
@@ -70,6 +83,8 @@ template <class Value>
 void prepare_control(const ControlChoice& choice, const Passage<Value>& ray, Control<Value>& control, Rates& residual) {
   const auto value = [](const Spectrum& x) { return load<Value>(x.data(), static_cast<int>(x.size())); };
   control.of_segment.clear();
+  control.depth_before.clear();
+  control.segment_begin.clear();
   control.linear = choice.kind == "linear";
   control.exponential_profile = choice.kind == "exponential";
   control.channels = ray.channels;
@@ -114,6 +129,8 @@ void prepare_control(const ControlChoice& choice, const Passage<Value>& ray, Con
       }
       least = most = constant;
       control.of_segment.push_back(constant);
+      control.depth_before.push_back(control.depth);
+      control.segment_begin.push_back(segment.begin);
       control.depth += constant * (segment.end - segment.begin);
     }
     Real deviation = 0;

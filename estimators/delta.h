@@ -85,6 +85,8 @@ struct DeltaTracking {
 
   Value result(const Walk& walk, const Ray&) const { return walk.transmittance; }
 
+  Value transmittance_at(const Walk& walk, const Ray&, Real) const { return walk.transmittance; }
+
   int real_collisions(const Walk& walk, const Ray& ray) const {
     if (ray.per_channel.empty()) return walk.done;
     int dead = 0;

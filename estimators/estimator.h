@@ -21,7 +21,9 @@ enum class Claim { exact, unbiased, consistent, biased };
 /// Values one sample can take, when the majorant bounds the extinction.
 enum class SampleRange { binary, unit, non_negative, any_sign };
 
-enum class Quantity { transmittance, optical_depth };
+/// What is estimated: T = exp(-tau); tau; T at several distances of one walk; how a free flight ends.
+enum class Quantity { transmittance, optical_depth, transmittance_profile, free_path };
+inline constexpr std::size_t kQuantities = 4;
 
 /// Exact moments of one sample, where known; lookups are their expectation.
 struct Theory {
@@ -81,6 +83,11 @@ struct Passage {
 //   Value optical_depth(const Walk&, const Ray&) const      answers Quantity::optical_depth as well
 //   Event<Value> event(const Walk&, const Ray&) const       how the flight ended: answers Quantity::free_path, drives paths
 //   bool samples_events(int channels) const                 false where there is no event for so many channels; default true
+//   Theory weight_theory(const Ray&, const RayProfile&, int channel) const
+//                                                           of the event's weight and the lookups of the flight
+//   Value transmittance_at(const Walk&, const Ray&, Real distance) const
+//                                                           estimate of T(begin, distance) by a walk that has met no collision
+//                                                           since `distance`: answers Quantity::transmittance_profile
 //   Value expected(const Value& tau, const Ray&) const      a target other than exp(-tau), e.g. a factor of T
 //   bool flies_once(int channels) const                     false where a sample is several flights; default true
 //   int real_collisions(const Walk&, const Ray&) const      tentative collisions that ended a walk; default 0

@@ -30,6 +30,8 @@ struct RatioTracking {
 
   Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
 
+  Value transmittance_at(const Walk& walk, const Passage<Value>&, Real) const { return walk.weight; }
+
   /// Partial expectations E[X; K = k] = e^{-M} (int (mub - mu))^k / k!, and of X^2 with (mub - mu)^2/mub.
   CountLaw count_law(const Passage<Value>& ray, const RayProfile& profile, int c) const {
     const Real depth = ray.majorant.total_depth();

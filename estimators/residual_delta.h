@@ -46,12 +46,12 @@ struct ResidualDeltaTracking {
   }
 
   struct Walk {
-    Value transmittance;
+    Value transmittance;  ///< estimate of T_r, 1 until the channel dies
     bool done = false;
   };
 
   void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
-    walk = {exponential(Value(-ray.control.depth)), false};
+    walk = {ray.value(1), false};
     flight.start(ray.residual);
   }
 
@@ -68,7 +68,11 @@ struct ResidualDeltaTracking {
     walk.done = !any;
   }
 
-  Value result(const Walk& walk, const Ray&) const { return walk.transmittance; }
+  Value result(const Walk& walk, const Ray& ray) const { return exponential(Value(-ray.control.depth)) * walk.transmittance; }
+
+  Value transmittance_at(const Walk& walk, const Ray& ray, Real distance) const {
+    return exponential(Value(-ray.control.depth_to(distance))) * walk.transmittance;
+  }
 
   int real_collisions(const Walk& walk, const Ray&) const { return walk.done; }
 

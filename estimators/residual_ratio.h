@@ -49,11 +49,11 @@ struct ResidualRatioTracking {
   }
 
   struct Walk {
-    Value weight;
+    Value weight;  ///< estimate of T_r
   };
 
   void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
-    walk.weight = ray.with_control ? exponential(Value(-ray.control.depth)) : ray.value(1);
+    walk.weight = ray.value(1);
     flight.start(ray.residual);
   }
 
@@ -63,7 +63,13 @@ struct ResidualRatioTracking {
     walk.weight *= (at.rate() - (extinction - ray.control.at(at.position(), at.piece()))) / at.rate();
   }
 
-  Value result(const Walk& walk, const Ray&) const { return walk.weight; }
+  Value result(const Walk& walk, const Ray& ray) const {
+    return ray.with_control ? Value(exponential(Value(-ray.control.depth)) * walk.weight) : walk.weight;
+  }
+
+  Value transmittance_at(const Walk& walk, const Ray& ray, Real distance) const {
+    return exponential(Value(-ray.control.depth_to(distance))) * walk.weight;
+  }
 
   Value expected(const Value& tau, const Ray& ray) const {
     const Value residual = ray.with_residual ? Value(tau - ray.control.depth) : ray.value(0);

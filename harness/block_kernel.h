@@ -36,8 +36,6 @@ class BlockKernel final : public Kernel {
   /// A walk this long is reported as an error instead of running on: nothing may hang, and nothing may be cut short in silence.
   static constexpr std::uint32_t kMostLookups = 1u << 30;
   static constexpr std::uint32_t kStepsBetweenStops = 1u << 14;
-  /// Relative rounding allowed to an extinction above its bound before it counts as a violation.
-  static constexpr Real kSlack = 1e-9;
 
   struct State final : Workspace {
     Ray ray;
@@ -47,6 +45,12 @@ class BlockKernel final : public Kernel {
     std::array<std::uint32_t, kBlock> active;
     std::array<Real, kBlock> x, y, z, ahead{};
     std::array<Real, kBlock*(std::is_same_v<Value, Real> ? 1 : kMaxChannels)> extinction;
+    std::vector<std::uint32_t> marked;  ///< of a profile, per walk: marks told
+  };
+
+  static constexpr bool kSamplesEvents = requires(const E& e, const Walk& walk, const Ray& ray) { e.event(walk, ray); };
+  static constexpr bool kTellsProfile = requires(const E& e, const Walk& walk, const Ray& ray) {
+    e.transmittance_at(walk, ray, Real{0});
   };
 
  public:
@@ -70,9 +74,21 @@ class BlockKernel final : public Kernel {
   }
 
   bool answers(Quantity quantity) const override {
-    return quantity == Quantity::transmittance || requires(const E& e, const Walk& walk, const Ray& ray) {
-      e.optical_depth(walk, ray);
-    };
+    constexpr bool depth = requires(const E& e, const Walk& walk, const Ray& ray) { e.optical_depth(walk, ray); };
+    if (quantity == Quantity::optical_depth) return depth;
+    if (quantity == Quantity::transmittance_profile) return kTellsProfile && flies();
+    if (quantity == Quantity::free_path) {
+      if constexpr (requires { estimator_.samples_events(channels_); }) return estimator_.samples_events(channels_);
+      return kSamplesEvents;
+    }
+    return true;
+  }
+
+  std::size_t outputs(Quantity quantity, const RayContext& context) const override {
+    const auto channels = static_cast<std::size_t>(channels_);
+    if (quantity == Quantity::transmittance_profile) return context.marks.size() * channels;
+    if (quantity == Quantity::free_path) return (kFreePathBins + (scatters(context.albedo) ? 3 : 2)) * channels;
+    return channels;
   }
 
   std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
@@ -99,14 +115,14 @@ class BlockKernel final : public Kernel {
   void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
     State& state = static_cast<State&>(workspace);
-    const auto channels = static_cast<std::size_t>(channels_);
-    out.values.resize(count * channels);
+    const std::size_t outputs = this->outputs(quantity, context);
+    out.values.resize(count * outputs);
     out.lookups.assign(count, 0);
     counters.samples += count;
     for (std::size_t done = 0; done < count; done += kBlock) {
       const auto run = state.recording ? &BlockKernel::run_block<true> : &BlockKernel::run_block<false>;
       (this->*run)(state, medium, context, key, first + done, std::min(kBlock, count - done), quantity,
-                   &out.values[done * channels], &out.lookups[done], counters);
+                   &out.values[done * outputs], &out.lookups[done], counters);
     }
   }
 
@@ -144,7 +160,13 @@ class BlockKernel final : public Kernel {
     std::vector<Theory> result(static_cast<std::size_t>(channels_));
     if constexpr (requires(Ray r) { estimator_.theory(r, profile, 0, quantity); }) {
       const Ray& ray = static_cast<const State&>(workspace).ray;
-      for (int c = 0; c < channels_; ++c) result[static_cast<std::size_t>(c)] = estimator_.theory(ray, profile, c, quantity);
+      for (int c = 0; c < channels_; ++c) {
+        Theory& theory = result[static_cast<std::size_t>(c)];
+        theory = estimator_.theory(ray, profile, c, quantity);
+        if (quantity == Quantity::free_path || quantity == Quantity::transmittance_profile) theory.mean = theory.variance = {};
+        if constexpr (requires(Ray r) { estimator_.weight_theory(r, profile, 0); })
+          if (quantity == Quantity::free_path) theory = estimator_.weight_theory(ray, profile, c);
+      }
     }
     return result;
   }
@@ -155,6 +177,9 @@ class BlockKernel final : public Kernel {
                  std::size_t count, Quantity quantity, Real* values, std::uint32_t* lookups, Counters& counters) const {
     const Ray& ray = state.ray;
     const auto channels = static_cast<std::size_t>(channels_);
+    const std::size_t outputs = this->outputs(quantity, context);
+    const bool profile = quantity == Quantity::transmittance_profile;
+    if (profile) state.marked.assign(count, 0);
     for (std::size_t k = 0; k < count; ++k) {
       state.rng[k] = Rng(SampleAddress{key, context.index, first + k});
       state.flight[k].start(ray.majorant);
@@ -175,19 +200,26 @@ class BlockKernel final : public Kernel {
       for (std::size_t a = 0; a < active; ++a) {
         const std::uint32_t k = state.active[a];
         Flight& flight = state.flight[k];
-        if (estimator_.propose(state.walk[k], ray, flight, state.rng[k])) {
+        const bool goes_on = estimator_.propose(state.walk[k], ray, flight, state.rng[k]);
+        if (profile) mark(state, ray, k, goes_on ? flight.position() : kInfinity, context.marks, values + k * outputs);
+        if (goes_on) {
           const Real t = flight.position();
           state.x[kept] = origin.x() + t * direction.x();
           state.y[kept] = origin.y() + t * direction.y();
           state.z[kept] = origin.z() + t * direction.z();
           state.active[kept++] = k;
         } else {
-          finish(state, ray, k, quantity, values + k * channels);
+          finish(state, ray, k, quantity, context, values + k * outputs);
           if constexpr (recorded) {
             Recording::Walk& walk = state.recording->walks[recorded_before + k];
             walk.depth = flight.depth();
             walk.total_depth = flight.depth() + flight.depth_left();
             walk.draws = state.rng[k].draws();
+            if constexpr (kSamplesEvents) {
+              const Event<Value> event = estimator_.event(state.walk[k], ray);
+              walk.end = event.kind;
+              walk.distance = event.distance;
+            }
           }
           counters.draws += state.rng[k].draws();
           counters.lookups += lookups[k];
@@ -227,7 +259,41 @@ class BlockKernel final : public Kernel {
     for (std::size_t a = 0; a < active; ++a) state.rng[state.active[a]].make_ready(state.ahead[a]);
   }
 
-  void finish(State& state, const Ray& ray, std::uint32_t k, Quantity quantity, Real* values) const {
+  /// Tells the profile's marks that the walk has passed before its next collision at `reached`.
+  void mark(State& state, const Ray& ray, std::uint32_t k, Real reached, std::span<const Real> marks, Real* values) const {
+    if constexpr (kTellsProfile) {
+      std::uint32_t& marked = state.marked[k];
+      for (; marked < marks.size() && marks[marked] < reached; ++marked)
+        store(estimator_.transmittance_at(state.walk[k], ray, marks[marked]),
+              values + marked * static_cast<std::size_t>(channels_));
+    }
+  }
+
+  /// Scores of a free path: its weight in the bin of its collision, where it scatters, where it escapes, and wherever it ends.
+  void score(State& state, const Ray& ray, std::uint32_t k, const RayContext& context, Real* values) const {
+    if constexpr (kSamplesEvents) {
+      const Event<Value> event = estimator_.event(state.walk[k], ray);
+      const auto channels = static_cast<std::size_t>(channels_);
+      std::fill(values, values + outputs(Quantity::free_path, context), Real{0});
+      Real* const scattered = values + kFreePathBins * channels;
+      Real* const escaped = scattered + (scatters(context.albedo) ? channels : 0);
+      store(event.weight, escaped + channels);
+      if (event.kind == EventKind::escape) store(event.weight, escaped);
+      if (!is_collision(event.kind)) return;
+      const auto after = std::upper_bound(context.marks.begin(), context.marks.end(), event.distance);
+      const auto cell = std::clamp<std::ptrdiff_t>(after - context.marks.begin() - 1, 0, kFreePathCells - 1);
+      store(event.weight, values + static_cast<std::size_t>(cell) / (kFreePathCells / kFreePathBins) * channels);
+      if (!scatters(context.albedo)) return;
+      // Samplers that leave the kind open are grey.
+      const bool scatter = event.kind == EventKind::scatter ||
+                           (event.kind == EventKind::collision && state.rng[k].uniform() < channel(ray.albedo, 0));
+      if (scatter) store(event.weight, scattered);
+    }
+  }
+
+  void finish(State& state, const Ray& ray, std::uint32_t k, Quantity quantity, const RayContext& context, Real* values) const {
+    if (quantity == Quantity::transmittance_profile) return;
+    if (quantity == Quantity::free_path) return score(state, ray, k, context, values);
     if constexpr (requires(Walk w) { estimator_.optical_depth(w, ray); }) {
       if (quantity == Quantity::optical_depth) {
         store(estimator_.optical_depth(state.walk[k], ray), values);
@@ -247,7 +313,7 @@ class BlockKernel final : public Kernel {
   void audit(const Ray& ray, const Flight& at, const Value& extinction, Counters& counters) const {
     if constexpr (requires { E::kIgnoresMajorant; }) return;
     const Real bound = ray.majorant.rate(at.piece()), most = largest(extinction);
-    if (most > bound * (1 + kSlack)) {
+    if (exceeds(most, bound)) {
       ++counters.violations;
       counters.largest_violation = std::max(counters.largest_violation, most / bound);
     }

@@ -9,9 +9,11 @@
 namespace nullmark {
 namespace {
 
-const std::vector<std::pair<Quantity, const char*>> kQuantities = {
+const std::vector<std::pair<Quantity, const char*>> kSummaries = {
     {Quantity::transmittance, "T = exp(-tau) along each ray"},
-    {Quantity::optical_depth, "tau, the integral of extinction along each ray"}};
+    {Quantity::optical_depth, "tau, the integral of extinction along each ray"},
+    {Quantity::transmittance_profile, "T up to 8 distances of each ray, from one walk"},
+    {Quantity::free_path, "how a flight along each ray ends: where it collides, scatters or escapes, and with what weight"}};
 
 Json parameters_list(ComponentKind kind, const std::string& type) {
   Json list = Json::array();
@@ -28,8 +30,8 @@ Json parameters_list(ComponentKind kind, const std::string& type) {
 void add_traits(const std::string& name, Json& json) {
   const EstimatorEntry& entry = *Registry<EstimatorEntry>::instance().find(name);
   const std::unique_ptr<EstimatorSource> source = entry.make();
-  Json claims = {{to_string(Quantity::transmittance), to_string(source->claim(Quantity::transmittance))}};
-  if (entry.answers_optical_depth) claims[to_string(Quantity::optical_depth)] = to_string(source->claim(Quantity::optical_depth));
+  Json claims = Json::object();
+  for (const Quantity quantity : entry.quantities) claims[to_string(quantity)] = to_string(source->claim(quantity));
   json["claims"] = std::move(claims);
   json["range"] = to_string(entry.range);
   json["needs_bound"] = entry.needs_bound;
@@ -91,7 +93,7 @@ ExitCode list_command(const ListCommand& command) {
   if (command.what == "majorants") list = component_list(ComponentKind::majorant);
   if (command.what == "rays") list = component_list(ComponentKind::ray_set);
   if (command.what == "quantities")
-    for (const auto& [quantity, summary] : kQuantities) list.push_back({{"name", to_string(quantity)}, {"summary", summary}});
+    for (const auto& [quantity, summary] : kSummaries) list.push_back({{"name", to_string(quantity)}, {"summary", summary}});
   if (command.json)
     fmt::print("{}\n", list.dump(2));
   else

@@ -69,7 +69,7 @@ std::string compare_results(const std::vector<RunRecord>& runs, const std::strin
   std::vector<std::string> known;
   for (const RunRecord& run : runs)
     for (const CellRecord& record : run.cells) {
-      if (record.status != Status::ok) continue;
+      if (record.status != Status::ok || !record.outputs.empty()) continue;
       std::vector<Row>& rows = groups[group_of(record)];
       if (rows.empty()) order.push_back(group_of(record));
       rows.push_back({&record, efficiency(record)});

@@ -44,10 +44,7 @@ std::vector<std::string> joined(std::vector<std::string> a, const std::vector<st
   return a;
 }
 
-Quantity read_quantity(const Place& place) {
-  const std::vector<std::string> names = {to_string(Quantity::transmittance), to_string(Quantity::optical_depth)};
-  return place.one_of(names, "quantity") == names[0] ? Quantity::transmittance : Quantity::optical_depth;
-}
+Quantity read_quantity(const Place& place) { return *quantity_named(place.one_of(quantity_names(), "quantity")); }
 
 Measurement read_measurement(const Place& place) {
   place.expect_keys({"clamp", "quantise_bits"});

@@ -172,24 +172,24 @@ CellGate gate_of(const Subject& subject, std::uint64_t samples_per_ray, const st
   auto built = std::make_shared<BuiltRays>();
   built->world.resize(rays);
   scene.rays = built;
-  scene.reference =
-      std::make_shared<const Reference>(Reference{1, std::vector<Real>(rays, 1), std::vector<Real>(rays, 1e-12), ""});
   Cell cell;
   cell.samples_per_ray = samples_per_ray;
   cell.gate.epsilon = subject.epsilon;
   cell.gate.max_samples_per_ray = std::uint64_t{1} << 40;
   CellTheory theory;
+  Targets targets;
   for (std::size_t ray = 0; ray < rays; ++ray) {
     const Law& law = subject.rays[ray];
     const Real mean = subject.claimed.empty() ? law.mean() : subject.claimed[ray];
-    theory.ray_expected.push_back(subject.lookups ? 0.5 : mean);
+    targets.mean.push_back(subject.lookups ? 0.5 : mean);
+    targets.error.push_back(targets.mean.back() * 1e-12);
     theory.ray_shift.push_back(0);
     if (!pilot) theory.ray_variance.push_back(subject.constant ? 0 : subject.lookups ? 0.25 : law.variance());
     if (!subject.lookups) continue;
     theory.ray_lookups.push_back(law.mean());
     theory.ray_lookups_variance.push_back(law.variance());
   }
-  CellGate gate = plan_gate(cell, scene, subject.range, Claim::unbiased, true, theory, pilot, {});
+  CellGate gate = plan_gate(cell, scene, targets, subject.range, Claim::unbiased, theory, pilot, {});
   if (subject.lookups) std::erase_if(gate.tests, [](const MeanTest& test) { return test.channel != MeanTest::kLookups; });
   return gate;
 }

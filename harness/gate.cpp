@@ -11,8 +11,6 @@
 namespace nullmark {
 namespace {
 
-constexpr Real kUnknown = std::numeric_limits<Real>::quiet_NaN();
-
 /// Rates of the bets, as multiples of epsilon/variance: a mixture over them stands in for the rate that hindsight would pick.
 constexpr Real kFailRates[] = {0.4, 1.5}, kPassRates[] = {0.5, 0.9};
 
@@ -35,13 +33,17 @@ Real default_epsilon(Real transmittance) {
   return transmittance > 1e-4 ? 0.05 : 0.5;
 }
 
-/// Absolute margin of a channel.  Where hardly anything is absorbed it shrinks with 1 - T, or a tracker that sees no medium at
+/// Absolute margin of the scores of a free path, where they are rare.
+constexpr Real kRareScore = 1e-4;
+
+/// Absolute margin of an output.  Where hardly anything is absorbed it shrinks with 1 - T, or a tracker that sees no medium at
 /// all would pass.
 Real absolute_epsilon(const Cell& cell, Real mean) {
   if (cell.gate.epsilon) return *cell.gate.epsilon * mean;
   if (cell.quantity == Quantity::optical_depth) return 0.01 * mean;
-  constexpr Real kOfAbsorbed = 0.1;
   const Real margin = default_epsilon(mean) * mean, absorbed = 1 - mean;
+  if (cell.quantity == Quantity::free_path) return std::max(margin, kRareScore);
+  constexpr Real kOfAbsorbed = 0.1;
   return absorbed > 1e-12 ? std::min(margin, kOfAbsorbed * absorbed) : margin;
 }
 
@@ -132,6 +134,12 @@ std::uint64_t largest_power_of_two_divisor(std::uint64_t n) { return n & (~n + 1
 /// Upper bound on the number of ray groups, from the specification alone.
 std::uint64_t possible_groups(const Component& rays) { return rays.type == "single" ? 0 : kRayGroups; }
 
+/// Upper bound on the outputs of a quantity, for each channel.
+std::uint64_t outputs_per_channel(Quantity quantity) {
+  if (quantity == Quantity::transmittance_profile) return kProfileMarks;
+  return quantity == Quantity::free_path ? kFreePathBins + 3 : 1;
+}
+
 std::uint64_t channels_of(const MediumSpec& medium) {
   if (!medium.per_channel.empty()) return medium.per_channel.size();
   return std::max<std::size_t>(1, medium.spectrum.size());
@@ -175,23 +183,23 @@ Evidence& Evidence::operator+=(const Evidence& other) {
   return *this;
 }
 
-CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Claim claim, bool bounding, const CellTheory& theory,
-                   const std::optional<Pilot>& pilot, const GateLevels& levels) {
-  const std::size_t rays = scene.rays->world.size();
-  const auto channels = static_cast<std::size_t>(scene.reference->channels);
+CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Claim claim,
+                   const CellTheory& theory, const std::optional<Pilot>& pilot, const GateLevels& levels) {
+  const std::size_t rays = scene.rays->world.size(), outputs = targets.outputs;
   CellGate gate;
   const bool own_mean = claim == Claim::consistent || claim == Claim::biased;
   gate.against = own_mean ? "own mean" : "reference";
   gate.group_of = ray_groups(*scene.rays);
   const int groups = rays < static_cast<std::size_t>(kRayGroups) ? 0 : kRayGroups;
 
-  if (cell.quantity == Quantity::optical_depth || (!bounding && range != SampleRange::binary)) range = SampleRange::any_sign;
+  if (cell.quantity == Quantity::optical_depth || (!scene.bounding && range != SampleRange::binary))
+    range = SampleRange::any_sign;
   if (range != SampleRange::any_sign) gate.low = 0;
   if (range == SampleRange::binary || range == SampleRange::unit) gate.high = 1;
 
   const bool analytic = !theory.ray_variance.empty();
   gate.variance_basis = analytic ? "analytic" : pilot ? "pilot" : "none";
-  gate.shift.assign(rays * channels, 0);
+  gate.shift.assign(rays * outputs, 0);
   if (own_mean && !theory.ray_shift.empty()) gate.shift = theory.ray_shift;
   if (!analytic && !pilot) return gate;
 
@@ -202,18 +210,17 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
   std::vector<Pool> pools;
   constexpr Real kUlp = std::numeric_limits<Real>::epsilon();
   const Real mean_lookups = theory.lookups.value_or(0);
-  for (std::size_t c = 0; c < channels; ++c) {
+  for (std::size_t o = 0; o < outputs; ++o) {
     std::vector<Pool> by_group(static_cast<std::size_t>(groups) + 1);
     for (std::size_t ray = 0; ray < rays; ++ray) {
-      const std::size_t at = ray * channels + c;
-      const Real mean = theory.ray_expected[at] + gate.shift[at];
-      const Real depth_error = scene.reference->error[at];
+      const std::size_t at = ray * outputs + o;
+      const Real mean = targets.mean[at] + gate.shift[at];
       for (Pool* pool : {&by_group[0], groups ? &by_group[static_cast<std::size_t>(gate.group_of[ray]) + 1] : nullptr}) {
         if (!pool) continue;
         ++pool->rays;
         pool->mean += mean;
         pool->variance += analytic ? theory.ray_variance[at] : pilot->variance[at];
-        pool->reference_error += cell.quantity == Quantity::transmittance ? mean * depth_error : depth_error;
+        pool->reference_error += targets.error[at];
         pool->least = std::min(pool->least, mean);
         pool->most = std::max(pool->most, mean);
       }
@@ -225,16 +232,15 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
       pool.mean /= n;
       if (g == 0) epsilon = absolute_epsilon(cell, pool.mean);
       MeanTest test;
-      test.channel = static_cast<int>(c);
+      test.channel = static_cast<int>(o);
       test.group = static_cast<int>(g) - 1;
       test.rays = pool.rays;
       test.epsilon = g == 0 ? epsilon : epsilon * kGroupMargin;
       test.reference_error = pool.reference_error / n;
       test.variance = pool.variance / n;
       const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0;
-      test.rounding = 64 * kUlp * (1 + mean_lookups + depth) *
-                      std::max(std::abs(pool.most),
-                               std::abs(pool.least));  // Rare events that a pilot did not see are no proof of a zero variance.
+      test.rounding = 64 * kUlp * (1 + mean_lookups + depth) * std::max(std::abs(pool.most), std::abs(pool.least));
+      // Rare events that a pilot did not see are no proof of a zero variance.
       test.deterministic = analytic && !(test.variance > kSurely * test.rounding * test.rounding);
       if (!analytic && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
       // Far below epsilon a variance decides nothing, and theory's may be rounding.
@@ -298,8 +304,8 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Clai
     test.rays = rays;
     constexpr Real kCostEpsilon = 0.01;
     // Expected lookups come from a quadrature as well.
-    constexpr Real kTheoryError =
-        1e-6;  // Below one lookup a sample a hundredth of a standard deviation is as much as anybody asks for.
+    constexpr Real kTheoryError = 1e-6;
+    // Below one lookup a sample a hundredth of a standard deviation is as much as anybody asks for.
     test.epsilon = kCostEpsilon * std::max(pool.mean / n, std::sqrt(pool.variance / n));
     test.reference_error = kTheoryError * pool.mean / n;
     test.variance = pool.variance / n;
@@ -358,7 +364,9 @@ TestRecord test_record(const MeanTest& test, const Evidence& evidence, int error
 std::uint64_t mean_family(const Plan& plan) {
   std::uint64_t tests = 0;
   for (const Cell& cell : plan.cells)
-    if (cell.gate.enabled) tests += channels_of(plan.media[cell.medium]) * (1 + possible_groups(plan.ray_sets[cell.rays]));
+    if (cell.gate.enabled)
+      tests += channels_of(plan.media[cell.medium]) * outputs_per_channel(cell.quantity) *
+               (1 + possible_groups(plan.ray_sets[cell.rays]));
   return std::max<std::uint64_t>(1, tests);
 }
 

@@ -14,6 +14,7 @@
 namespace nullmark {
 
 struct CellTheory;
+struct Targets;
 
 /// Groups that rays are judged in beside all of them together, since pooled biases cancel: tiles of an image, or runs of a list.
 inline constexpr int kRayGroups = 16;
@@ -32,7 +33,7 @@ enum class Role { fail, low, high };
 /// first sample is drawn.
 struct MeanTest {
   static constexpr int kAllRays = -1, kLookups = -1;
-  int channel = 0;  ///< kLookups: lookups against their expectation
+  int channel = 0;  ///< output of the quantity (a channel of a transmittance); kLookups: lookups against their expectation
   int group = kAllRays;
   std::size_t rays = 0;        ///< that take part
   Real epsilon = 0;            ///< absolute margin of PASS
@@ -50,7 +51,7 @@ struct CellGate {
   std::vector<MeanTest> tests;
   std::vector<int> group_of;  ///< per ray
   std::vector<Real>
-      shift;  ///< [ray * channels + c], the claimed mean minus the reference, for estimators judged by their own mean
+      shift;  ///< [ray * outputs + o], the claimed mean minus the reference, for estimators judged by their own mean
   std::vector<Real> lookups;  ///< per ray, expected; empty where unknown
   int errors_per_sum = 1, lookups_per_sum = 1;
   Real low = -kInfinity, high = kInfinity;  ///< the declared range of samples
@@ -73,15 +74,15 @@ struct Evidence {
 
 /// Variance per ray and channel from a pilot run, where theory has none.
 struct Pilot {
-  std::vector<Real> variance;          ///< [ray * channels + c]
+  std::vector<Real> variance;          ///< [ray * outputs + o]
   std::vector<Real> lookups_variance;  ///< per ray
-  Real variance_of_variance = 0;       ///< largest over channels of sum d^4/(sum d^2)^2 - 1/n
+  Real variance_of_variance = 0;       ///< largest over outputs of sum d^4/(sum d^2)^2 - 1/n
 };
 
-/// Plans the tests of a cell.  Needs the majorant to be true where `bounding`; without that, ranges that rest on it are not
-/// claimed. `pilot` serves where theory has no variance.
-CellGate plan_gate(const Cell& cell, const Scene& scene, SampleRange range, Claim claim, bool bounding, const CellTheory& theory,
-                   const std::optional<Pilot>& pilot, const GateLevels& levels);
+/// Plans the tests of a cell.  Where the majorant does not bound, ranges that rest on it are not claimed.  `pilot` serves where
+/// theory has no variance.
+CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Claim claim,
+                   const CellTheory& theory, const std::optional<Pilot>& pilot, const GateLevels& levels);
 
 /// The figures of a test, ready for the record.
 TestRecord test_record(const MeanTest& test, const Evidence& evidence, int errors_per_sum);
@@ -94,6 +95,6 @@ std::uint64_t lookups_family(const Plan& plan);
 std::uint64_t laws_family(const Plan& plan);
 
 /// How many laws a cell can be tested for, at most.
-inline constexpr std::uint64_t kLaws = 9;
+inline constexpr std::uint64_t kLaws = 11;
 
 }  // namespace nullmark

@@ -19,11 +19,17 @@ struct RayContext {
   std::vector<Real> knots;              ///< sorted, with begin and end; filled only when the kernel needs them
   std::optional<Spectrum> exact_depth;  ///< filled only when the kernel needs it
   Spectrum albedo;                      ///< mu_s / mu per channel; empty: 0
+  std::span<const Real> marks;          ///< distances that a profile or a free path is told at, ascending
 };
+
+/// Distances at which a transmittance profile is told; bins of a free path, and of its law's tests.
+inline constexpr std::size_t kProfileMarks = 8, kFreePathBins = 8, kFreePathCells = 64;
+
+inline bool scatters(const Spectrum& albedo) { return albedo.size() > 0 && albedo.maxCoeff() > 0; }
 
 /// Results of a block of samples of one ray.
 struct SampleBlock {
-  std::vector<Real> values;            ///< values[i * channels + c]
+  std::vector<Real> values;            ///< values[i * outputs + o]
   std::vector<std::uint32_t> lookups;  ///< per sample
 };
 
@@ -57,6 +63,8 @@ struct Recording {
     Real depth = 0;                ///< where the flight ended
     Real total_depth = 0;          ///< of the rates it flew through
     std::uint64_t draws = 0;
+    EventKind end = EventKind::escape;  ///< of samplers of free paths: how, and how far along the ray, the flight ended
+    Real distance = 0;
   };
   std::vector<Walk> walks;
 };
@@ -82,6 +90,9 @@ class Kernel {
   virtual bool answers(Quantity) const = 0;
   virtual std::unique_ptr<Workspace> workspace() const = 0;
 
+  /// Numbers that one sample of a quantity gives.
+  virtual std::size_t outputs(Quantity, const RayContext&) const = 0;
+
   /// Prepares a ray; the samples and theory of that ray follow.
   virtual void begin_ray(Workspace&, const Medium&, const Extrema& medium, const RayContext&) const = 0;
 
@@ -92,7 +103,8 @@ class Kernel {
   /// Mean of the estimator's target on this ray, given the exact optical depth: T = exp(-tau) or tau, unless it names another.
   virtual Spectrum expected(const Workspace&, const Spectrum& optical_depth, Quantity) const = 0;
 
-  /// Exact moments per channel; empty where the estimator states none.
+  /// Exact moments per channel; empty where the estimator states none.  Of a free path the variance is that of its weight; of a
+  /// profile only lookups are stated.
   virtual std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const = 0;
 
   /// Whether a sample is one flight through a majorant, so that the laws of collisions apply.

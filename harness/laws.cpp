@@ -50,9 +50,10 @@ Real uniformity(std::vector<Real>& u) {
 /// All that the walks of the chosen rays tell.
 class LawTester {
  public:
-  LawTester(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleRange range, const CellTheory& theory)
-      : cell_(cell), scene_(scene), kernel_(kernel), range_(range), theory_(theory) {
-    channels_ = static_cast<std::size_t>(scene.reference->channels);
+  LawTester(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets, SampleRange range,
+            const CellTheory& theory)
+      : cell_(cell), scene_(scene), kernel_(kernel), targets_(targets), range_(range), theory_(theory) {
+    outputs_ = targets.outputs;
     const std::size_t rays = scene.rays->world.size();
     for (std::size_t i = 0; i < std::min(rays, kMostRays); ++i) rays_.push_back(i * rays / std::min(rays, kMostRays));
   }
@@ -80,7 +81,7 @@ class LawTester {
                        cell_.quantity, block, counters);
         workspace->recording = nullptr;
         for (std::size_t i = 0; i < recording.walks.size(); ++i) {
-          take(ray, recording.walks[i], &block.values[i * channels_]);
+          take(ray, recording.walks[i], &block.values[i * outputs_]);
           now.push_back(centred_flight(recording.walks[i]));
         }
         // A sample is a function of its address: drawn alone it is the same.
@@ -88,8 +89,8 @@ class LawTester {
         SampleBlock alone;
         kernel_.sample(*workspace, *scene_.medium->medium, context_, key, kFirstSample + done + last, 1, cell_.quantity, alone,
                        counters);
-        for (std::size_t c = 0; c < channels_; ++c) {
-          const Real together = block.values[last * channels_ + c];
+        for (std::size_t c = 0; c < outputs_; ++c) {
+          const Real together = block.values[last * outputs_ + c];
           if (together != alone.values[c] && std::isfinite(together)) other_alone_ = true;
         }
         ++replayed_;
@@ -128,7 +129,7 @@ class LawTester {
     // With many collisions no count comes often enough.
     constexpr Real kMostCollisions = 500;
     if (cell_.quantity == Quantity::transmittance && kernel_.states_count_law() && theory_.lookups.value_or(0) < kMostCollisions)
-      laws_ = kernel_.count_law(workspace, profile_of(ray));
+      laws_ = kernel_.count_law(workspace, make_profile(*scene_.medium->medium, scene_.rays->local[ray], context_.segments));
     by_count_.emplace_back();
 
     Real depth = 0;
@@ -140,33 +141,12 @@ class LawTester {
     majorant_depth_ = depth;
     bound_ = 0;
     const bool bounded = cell_.quantity == Quantity::transmittance && range_ != SampleRange::any_sign;
-    for (std::size_t c = 0; c < channels_ && !theory_.ray_variance.empty(); ++c) {
-      const std::size_t at = ray * channels_ + c;
-      const Real mean = theory_.ray_expected[at] + theory_.ray_shift[at];
+    for (std::size_t c = 0; c < outputs_ && !theory_.ray_variance.empty(); ++c) {
+      const std::size_t at = ray * outputs_ + c;
+      const Real mean = targets_.mean[at] + theory_.ray_shift[at];
       const bool unit = bounded && (range_ == SampleRange::unit || range_ == SampleRange::binary);
       bound_ = std::max(bound_, unit ? std::max(mean * mean, (1 - mean) * (1 - mean)) : 0);
     }
-  }
-
-  RayProfile profile_of(std::size_t ray) {
-    const Medium& medium = *scene_.medium->medium;
-    const Ray& local = scene_.rays->local[ray];
-    std::vector<Real> knots, ends, rates;
-    sorted_knots(medium, local, knots);
-    for (const Segment& segment : context_.segments.segments) {
-      ends.push_back(segment.end);
-      rates.push_back(segment.majorant);
-    }
-    return RayProfile(
-        [&medium, local](const Real* t, std::size_t n, Real* out) {
-          std::vector<Real> x(n), y(n), z(n);
-          for (std::size_t i = 0; i < n; ++i) {
-            const Vec3 p = local.at(t[i]);
-            x[i] = p.x(), y[i] = p.y(), z[i] = p.z();
-          }
-          medium.extinction({x.data(), y.data(), z.data(), n}, out);
-        },
-        static_cast<int>(channels_), knots, ends, rates);
   }
 
   void take(std::size_t ray, const Recording::Walk& walk, const Real* values) {
@@ -187,9 +167,9 @@ class LawTester {
     if (n > 0 && walk.total_depth > 0) first_.push_back(std::expm1(-walk.steps[0].depth) / std::expm1(-walk.total_depth));
     by_count(n, values);
     if (theory_.ray_variance.empty()) return;
-    for (std::size_t c = 0; c < channels_; ++c) {
-      const std::size_t at = ray * channels_ + c;
-      const Real v = theory_.ray_variance[at], mean = theory_.ray_expected[at] + theory_.ray_shift[at];
+    for (std::size_t c = 0; c < outputs_; ++c) {
+      const std::size_t at = ray * outputs_ + c;
+      const Real v = theory_.ray_variance[at], mean = targets_.mean[at] + theory_.ray_shift[at];
       if (!(bound_ > 0) || !(v > kNoVariance * mean * mean)) continue;
       const Real error = values[c] - mean;
       variance_.bet((error * error - v) / (2 * bound_));
@@ -208,7 +188,7 @@ class LawTester {
   /// Standardised by what the number of collisions says, samples of one count have mean 0 and variance 1 - (first^2/second)^k.
   void by_count(std::size_t k, const Real* values) {
     if (laws_.empty() || k >= kMostCount) return;
-    for (std::size_t c = 0; c < channels_; ++c) {
+    for (std::size_t c = 0; c < outputs_; ++c) {
       const CountLaw& law = laws_[c];
       if (!(law.second > 0) || !(law.depth > 0)) continue;
       const auto power = static_cast<Real>(k);
@@ -222,8 +202,8 @@ class LawTester {
         continue;
       }
       std::vector<std::vector<Real>>& counts = by_count_.back();
-      counts.resize(std::max(counts.size(), (k + 1) * channels_));
-      std::vector<Real>& list = counts[k * channels_ + c];
+      counts.resize(std::max(counts.size(), (k + 1) * outputs_));
+      std::vector<Real>& list = counts[k * outputs_ + c];
       if (list.empty()) list.push_back(v);
       list.push_back(y);
     }
@@ -269,9 +249,10 @@ class LawTester {
   const Cell& cell_;
   const Scene& scene_;
   const Kernel& kernel_;
+  const Targets& targets_;
   SampleRange range_;
   const CellTheory& theory_;
-  std::size_t channels_ = 1;
+  std::size_t outputs_ = 1;
   std::vector<std::size_t> rays_;
   RayContext context_;
 
@@ -307,7 +288,7 @@ Scene in_pieces(const Scene& scene, const std::vector<std::size_t>& rays) {
     }
   }
   auto reference = std::make_shared<const Reference>(compute_reference(*scene.medium, *pieces));
-  return {scene.medium, scene.majorant, pieces, reference};
+  return {scene.medium, scene.majorant, pieces, reference, nullptr, bounds_everywhere(*scene.majorant, *pieces)};
 }
 
 /// Means of the pieces of a ray, at as many samples as the budget gives.
@@ -321,7 +302,8 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
   std::vector<std::size_t> taken;
   for (std::size_t i = 0; i < some; ++i) taken.push_back(rays[i * rays.size() / some]);
   const Scene pieces = in_pieces(scene, taken);
-  const std::vector<CellTheory> all = compute_theory(pieces, {&kernel}, {cell.quantity});
+  const Targets targets = compute_targets(pieces, kernel, cell.quantity);
+  const std::vector<CellTheory> all = compute_theory(pieces, {{&kernel, cell.quantity, range, &targets}});
   if (all[0].ray_variance.empty()) return std::nullopt;
   // Every piece starts anew, however early a walk of the whole ray would end.
   const Real each = (1 + all[0].lookups.value_or(1)) * static_cast<Real>(pieces.rays->world.size());
@@ -330,9 +312,8 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
   Cell own = cell;
   own.samples_per_ray = samples;
   own.gate = {};
-  const CellGate gate =
-      plan_gate(own, pieces, range, Claim::unbiased, bounds_everywhere(pieces, kernel), all[0], std::nullopt, {});
-  const auto sampled = sample_cell(own, pieces, kernel, {kFirstSample, samples}, &gate, stop, [](double) {});
+  const CellGate gate = plan_gate(own, pieces, targets, range, Claim::unbiased, all[0], std::nullopt, {});
+  const auto sampled = sample_cell(own, pieces, kernel, targets, {kFirstSample, samples}, &gate, stop, [](double) {});
   if (!sampled) return std::nullopt;
   std::vector<Real> logs;
   for (std::size_t i = 0; i < gate.tests.size(); ++i) {
@@ -348,11 +329,12 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
 
 }  // namespace
 
-std::vector<LawRecord> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleRange range,
-                                 const CellTheory& theory, const LawBudget& budget, const std::function<bool()>& stop) {
+std::vector<LawRecord> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
+                                 SampleRange range, const CellTheory& theory, const LawBudget& budget,
+                                 const std::function<bool()>& stop) {
   // Ranges rest on a true bound.
-  const SampleRange kept = range == SampleRange::binary || bounds_everywhere(scene, kernel) ? range : SampleRange::any_sign;
-  LawTester tester(cell, scene, kernel, kept, theory);
+  const SampleRange kept = range == SampleRange::binary || scene.bounding ? range : SampleRange::any_sign;
+  LawTester tester(cell, scene, kernel, targets, kept, theory);
   if (!tester.run(budget, stop)) return {};
   std::vector<LawRecord> records = tester.records();
   if (cell.quantity == Quantity::transmittance && scene.rays->world.size() > 0)

@@ -22,6 +22,7 @@ namespace nullmark {
 ///   independence  first flights of consecutive samples, and of neighbouring rays, are uncorrelated
 ///   replay        a sample drawn alone is bit for bit the one drawn among others
 ///   variance      (X - T)^2 has the mean that theory states
+///   kolmogorov_smirnov, chi_square   the law of free paths, see free_path_law.h
 ///   segments      the ray cut into pieces shallow enough for mean tests of their own
 ///
 /// Returns log E (or -log p) of each law that applies; a law that holds exceeds log(1/a) with probability at most a.
@@ -29,7 +30,8 @@ struct LawBudget {
   Real lookups = 2e5;                 ///< of all walks together, about
   std::uint64_t most_per_ray = 4096;  ///< samples
 };
-std::vector<LawRecord> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleRange range,
-                                 const CellTheory& theory, const LawBudget& budget, const std::function<bool()>& stop);
+std::vector<LawRecord> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
+                                 SampleRange range, const CellTheory& theory, const LawBudget& budget,
+                                 const std::function<bool()>& stop);
 
 }  // namespace nullmark

@@ -27,6 +27,13 @@ std::optional<Real> channel_root_mean_square(const CellRecord& record, Field fie
   return std::sqrt(sum / static_cast<Real>(record.channel.size()));
 }
 
+/// The weight of a free path at its end, in the first channel.
+std::optional<Real> weight(const CellRecord& record, Field field) {
+  for (std::size_t o = 0; o < record.outputs.size() && o < record.channel.size(); ++o)
+    if (record.outputs[o].rfind("weight", 0) == 0) return record.channel[o].*field;
+  return std::nullopt;
+}
+
 std::optional<Real> best_variance(const CellRecord& record, std::size_t channel) {
   const ChannelRecord& of = record.channel[channel];
   return of.variance_theory ? of.variance_theory : of.variance;
@@ -35,9 +42,10 @@ std::optional<Real> best_variance(const CellRecord& record, std::size_t channel)
 }  // namespace
 
 const std::vector<std::string>& metric_names() {
-  static const std::vector<std::string> kNames = {"mean",          "bias",          "rmse",
-                                                  "variance",      "kurtosis",      "relative_variance",
-                                                  "ns_per_sample", "ns_per_lookup", "lookups_per_sample"};
+  static const std::vector<std::string> kNames = {"mean",          "bias",           "rmse",
+                                                  "variance",      "kurtosis",       "relative_variance",
+                                                  "ns_per_sample", "ns_per_lookup",  "lookups_per_sample",
+                                                  "weight_mean",   "weight_variance"};
   return kNames;
 }
 
@@ -49,6 +57,8 @@ std::optional<Real> metric(const CellRecord& record, std::string_view name) {
   if (name == "kurtosis") return channel_average(record, &ChannelRecord::kurtosis);
   if (name == "relative_variance") return channel_average(record, &ChannelRecord::relative_variance);
   if (name == "lookups_per_sample") return record.lookups_per_sample;
+  if (name == "weight_mean") return weight(record, &ChannelRecord::mean);
+  if (name == "weight_variance") return weight(record, &ChannelRecord::variance);
   if (name == "ns_per_sample" && record.time) return record.time->ns_per_sample;
   if (name == "ns_per_lookup" && record.time) return record.time->ns_per_lookup;
   return std::nullopt;
@@ -58,6 +68,8 @@ std::optional<Real> metric_theory(const CellRecord& record, std::string_view nam
   if (name == "mean") return channel_average(record, &ChannelRecord::reference);
   if (name == "rmse") return channel_root_mean_square(record, &ChannelRecord::rmse_theory);
   if (name == "variance") return channel_average(record, &ChannelRecord::variance_theory);
+  if (name == "weight_mean") return weight(record, &ChannelRecord::reference);
+  if (name == "weight_variance") return weight(record, &ChannelRecord::variance_theory);
   if (name == "lookups_per_sample") return record.lookups_theory;
   return std::nullopt;
 }

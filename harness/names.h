@@ -1,5 +1,9 @@
 #pragma once
 
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "estimators/estimator.h"
 
 namespace nullmark {
@@ -33,8 +37,18 @@ inline const char* to_string(SampleRange range) {
   return "signed";
 }
 
-inline const char* to_string(Quantity quantity) {
-  return quantity == Quantity::transmittance ? "transmittance" : "optical_depth";
+inline const std::vector<std::string>& quantity_names() {
+  static const std::vector<std::string> kNames = {"transmittance", "optical_depth", "transmittance_profile", "free_path"};
+  return kNames;
+}
+
+inline const std::string& to_string(Quantity quantity) { return quantity_names()[static_cast<std::size_t>(quantity)]; }
+
+/// The quantity of a name; nothing where there is none.
+inline std::optional<Quantity> quantity_named(const std::string& name) {
+  for (std::size_t i = 0; i < quantity_names().size(); ++i)
+    if (quantity_names()[i] == name) return static_cast<Quantity>(i);
+  return std::nullopt;
 }
 
 }  // namespace nullmark

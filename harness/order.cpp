@@ -88,7 +88,7 @@ std::vector<OrderFit> fit_orders(const std::vector<CellRecord>& cells) {
   for (const CellRecord& record : cells) {
     const auto steps = record.cell.estimator.values.find("steps");
     // What is done to samples has a bias of its own.
-    if (record.cell.measurement != Measurement{}) continue;
+    if (record.cell.measurement != Measurement{} || !record.outputs.empty()) continue;
     if (record.status != Status::ok || record.claims != "consistent" || !record.order || record.channel.empty() ||
         steps == record.cell.estimator.values.end() || !std::holds_alternative<int>(steps->second))
       continue;

@@ -13,7 +13,7 @@ namespace nullmark {
 /// `skipped`: the combination does not apply or its data is missing.  `not_run`: never started (time budget, interrupt).
 enum class Status { ok, skipped, not_run, error };
 
-/// Statistics of one channel.  Absent: not known or not finite.
+/// Statistics of one channel, or of one output of a quantity with several.  Absent: not known or not finite.
 struct ChannelRecord {
   std::optional<Real> mean, reference, reference_error;  ///< averages over the rays
   std::optional<Real> bias;                              ///< mean - reference
@@ -98,6 +98,7 @@ struct CellRecord {
   std::string claims, range;
   std::optional<Real> order;  ///< of a consistent estimator's bias in its step
   int channels = 1;
+  std::vector<std::string> outputs;  ///< of quantities with several numbers a channel, what each entry of `channel` is
   std::vector<std::string> effects{"absorption"};
   Status status = Status::not_run;
   std::string reason;

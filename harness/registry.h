@@ -15,7 +15,7 @@ struct EstimatorEntry {
   std::string name, summary, source;
   SampleRange range = SampleRange::any_sign;
   bool needs_bound = false;
-  bool answers_optical_depth = false;
+  std::vector<Quantity> quantities;  ///< that it answers on grey media
   std::unique_ptr<EstimatorSource> (*make)() = nullptr;
   bool planted = false;   ///< a deliberately wrong tracker that the tests must catch; runs when named, is never listed
   std::string caught_by;  ///< planted: the check that must see it
@@ -24,16 +24,15 @@ struct EstimatorEntry {
 template <template <class> class Estimator>
 EstimatorEntry estimator_entry() {
   using E = Estimator<Real>;
-  constexpr bool kAnswersDepth = requires(const E& e, typename E::Walk w, typename detail::RayOf<E, Real>::type r) {
-    e.optical_depth(w, r);
-  };
   EstimatorEntry entry;
   entry.name = E::kName;
   entry.summary = E::kSummary;
   entry.source = E::kSource;
   entry.range = E::kRange;
   entry.needs_bound = E::kNeedsBound;
-  entry.answers_optical_depth = kAnswersDepth;
+  const auto kernel = EstimatorTemplate<Estimator>().kernel(1);
+  for (std::size_t i = 0; i < kQuantities; ++i)
+    if (kernel->answers(static_cast<Quantity>(i))) entry.quantities.push_back(static_cast<Quantity>(i));
   entry.make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<EstimatorTemplate<Estimator>>(); };
   return entry;
 }

@@ -24,8 +24,12 @@ const std::vector<std::string> kStatus = {"ok", "skipped", "not_run", "error"};
 Json real(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 Json real(const std::optional<Real>& x) { return x ? real(*x) : Json(nullptr); }
 
-Json reals(const std::vector<std::optional<Real>>& values, int channels) {
-  if (channels == 1) return values.empty() ? Json(nullptr) : real(values[0]);
+int outputs_of(const CellRecord& record) {
+  return record.outputs.empty() ? record.channels : static_cast<int>(record.outputs.size());
+}
+
+Json reals(const std::vector<std::optional<Real>>& values, int outputs) {
+  if (outputs == 1) return values.empty() ? Json(nullptr) : real(values[0]);
   Json list = Json::array();
   for (const std::optional<Real>& value : values) list.push_back(real(value));
   return list.empty() ? Json(nullptr) : list;
@@ -36,7 +40,7 @@ template <class Get>
 Json per_channel(const CellRecord& record, const Get& get) {
   std::vector<std::optional<Real>> values;
   for (std::size_t c = 0; c < record.channel.size(); ++c) values.push_back(get(c));
-  return reals(values, record.channels);
+  return reals(values, outputs_of(record));
 }
 
 Json field(const CellRecord& record, std::optional<Real> ChannelRecord::*member) {
@@ -78,8 +82,8 @@ Json convergence_json(const CellRecord& record) {
   Json list = Json::array();
   for (const ConvergenceRecord& step : record.convergence)
     list.push_back({{"samples", step.samples},
-                    {"rmse", reals(step.rmse, record.channels)},
-                    {"variance", reals(step.variance, record.channels)}});
+                    {"rmse", reals(step.rmse, outputs_of(record))},
+                    {"variance", reals(step.variance, outputs_of(record))}});
   return list;
 }
 
@@ -101,12 +105,12 @@ std::string string_or_empty(const Place& object, const char* key) {
 }
 
 /// The inverse of `reals` for a sampled cell.
-std::vector<std::optional<Real>> read_reals(const Place& object, const char* key, int channels) {
-  const auto size = static_cast<std::size_t>(channels);
+std::vector<std::optional<Real>> read_reals(const Place& object, const char* key, int outputs) {
+  const auto size = static_cast<std::size_t>(outputs);
   if (!object.has(key) || object[key].json().is_null()) return std::vector<std::optional<Real>>(size);
   const Place place = object[key];
-  if (channels == 1) return {optional_real(place)};
-  if (!place.json().is_array() || place.json().size() != size) place.expected(fmt::format("a list of {} numbers", channels));
+  if (outputs == 1) return {optional_real(place)};
+  if (!place.json().is_array() || place.json().size() != size) place.expected(fmt::format("a list of {} numbers", outputs));
   std::vector<std::optional<Real>> values;
   for (const Place& element : place.elements()) values.push_back(optional_real(element));
   return values;
@@ -187,9 +191,9 @@ TimeRecord read_time(const Place& place) {
 }
 
 void read_statistics(const Place& place, CellRecord& record) {
-  record.channel.resize(static_cast<std::size_t>(record.channels));
+  record.channel.resize(static_cast<std::size_t>(outputs_of(record)));
   const auto read = [&](const Place& object, const char* key, std::optional<Real> ChannelRecord::*member) {
-    const std::vector<std::optional<Real>> values = read_reals(object, key, record.channels);
+    const std::vector<std::optional<Real>> values = read_reals(object, key, outputs_of(record));
     for (std::size_t c = 0; c < values.size(); ++c) record.channel[c].*member = values[c];
   };
   read(place, "mean", &ChannelRecord::mean);
@@ -249,6 +253,7 @@ Json cell_json(const CellRecord& record) {
                {"quantity", to_string(cell.quantity)},
                {"measurement", measurement_json(cell.measurement)},
                {"channels", record.channels},
+               {"outputs", record.outputs},
                {"effects", record.effects},
                {"rays", record.rays},
                {"samples_per_ray", cell.samples_per_ray}};
@@ -303,12 +308,12 @@ CellRecord read_cell(const Place& place) {
   record.medium_hash = string_or_empty(place["medium"], "hash");
   record.majorant = read_component(ComponentKind::majorant, place["majorant"]);
   record.ray_set = read_component(ComponentKind::ray_set, place["ray_set"]);
-  const std::string quantity =
-      place["quantity"].one_of({to_string(Quantity::transmittance), to_string(Quantity::optical_depth)}, "quantity");
-  cell.quantity = quantity == to_string(Quantity::transmittance) ? Quantity::transmittance : Quantity::optical_depth;
+  cell.quantity = *quantity_named(place["quantity"].one_of(quantity_names(), "quantity"));
   cell.measurement.clamp = place["measurement"]["clamp"].boolean();
   cell.measurement.quantise_bits = static_cast<int>(place["measurement"]["quantise_bits"].integer(0, 31));
   record.channels = static_cast<int>(place["channels"].integer(1, kMaxChannels));
+  if (place.has("outputs"))
+    for (const Place& output : place["outputs"].elements()) record.outputs.push_back(output.string());
   record.effects.clear();
   for (const Place& effect : place["effects"].elements()) record.effects.push_back(effect.string());
   record.rays = place["rays"].unsigned_integer(0, kAny);
@@ -336,8 +341,8 @@ CellRecord read_cell(const Place& place) {
   if (place.has("time") && !place["time"].json().is_null()) record.time = read_time(place["time"]);
   if (place.has("convergence"))
     for (const Place& step : place["convergence"].elements())
-      record.convergence.push_back({step["samples"].unsigned_integer(0, kAny), read_reals(step, "rmse", record.channels),
-                                    read_reals(step, "variance", record.channels)});
+      record.convergence.push_back({step["samples"].unsigned_integer(0, kAny), read_reals(step, "rmse", outputs_of(record)),
+                                    read_reals(step, "variance", outputs_of(record))});
   cell.image_maximum = optional_real(place, "image_maximum").value_or(1);
   cell.images = place.has("images");
   if (cell.images) {

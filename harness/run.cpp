@@ -9,6 +9,7 @@
 #include <map>
 #include <thread>
 
+#include "harness/free_path_law.h"
 #include "harness/image.h"
 #include "harness/laws.h"
 #include "harness/names.h"
@@ -27,6 +28,7 @@ struct PreparedCell {
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const Kernel> kernel;
   std::string reason;
+  Targets targets;
   CellTheory theory;
   std::uint64_t samples_per_ray = 0;
   Claim claim = Claim::unbiased;
@@ -81,6 +83,7 @@ class Workshop {
     prepared.needs_bound = source->needs_bound();
     prepared.kernel = source->kernel(prepared.scene->medium->medium->channels());
     prepared.reason = why_not(cell, *prepared.scene, *prepared.kernel);
+    if (prepared.reason.empty()) prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity);
     return prepared;
   }
 
@@ -103,7 +106,9 @@ class Workshop {
   }
 
   std::shared_ptr<const Scene> scene(const Cell& cell) {
-    return once(scenes_, std::array{cell.medium, cell.majorant, cell.rays}, [&] {
+    const bool told_at_marks = cell.quantity == Quantity::transmittance_profile || cell.quantity == Quantity::free_path;
+    const std::size_t kind = told_at_marks ? static_cast<std::size_t>(cell.quantity) : 0;
+    return once(scenes_, std::array{cell.medium, cell.majorant, cell.rays, kind}, [&] {
       const auto medium = once(media_, cell.medium, [&] {
         return located(plan_.media[cell.medium].field.pointer,
                        [&] { return std::make_shared<const BuiltMedium>(build_medium(plan_.media[cell.medium])); });
@@ -119,7 +124,12 @@ class Workshop {
       });
       const auto reference = once(references_, std::array{cell.medium, cell.rays},
                                   [&] { return std::make_shared<const Reference>(compute_reference(*medium, *rays)); });
-      return std::make_shared<const Scene>(Scene{medium, structure, rays, reference});
+      std::shared_ptr<const Marks> marks;
+      if (told_at_marks)
+        marks = once(marks_, std::array{cell.medium, cell.rays, kind},
+                     [&] { return std::make_shared<const Marks>(compute_marks(*medium, *rays, cell.quantity)); });
+      return std::make_shared<const Scene>(
+          Scene{medium, structure, rays, reference, marks, bounds_everywhere(*structure, *rays)});
     });
   }
 
@@ -129,7 +139,8 @@ class Workshop {
   std::map<std::array<std::size_t, 2>, std::shared_ptr<const MajorantStructure>> structures_;
   std::map<std::array<std::size_t, 2>, std::shared_ptr<const BuiltRays>> rays_;
   std::map<std::array<std::size_t, 2>, std::shared_ptr<const Reference>> references_;
-  std::map<std::array<std::size_t, 3>, std::shared_ptr<const Scene>> scenes_;
+  std::map<std::array<std::size_t, 3>, std::shared_ptr<const Marks>> marks_;
+  std::map<std::array<std::size_t, 4>, std::shared_ptr<const Scene>> scenes_;
 };
 
 /// Theory of all runnable cells, scene by scene; a measurement stage changes the law of the samples, so those cells have none.
@@ -141,13 +152,10 @@ void add_theory(std::vector<PreparedCell>& cells) {
     if (prepared.reason.empty() && plain && prepared.kernel->states_theory()) by_scene[prepared.scene.get()].push_back(&prepared);
   }
   for (auto& [scene, members] : by_scene) {
-    std::vector<const Kernel*> kernels;
-    std::vector<Quantity> quantities;
-    for (const PreparedCell* member : members) {
-      kernels.push_back(member->kernel.get());
-      quantities.push_back(member->cell->quantity);
-    }
-    const std::vector<CellTheory> theory = compute_theory(*scene, kernels, quantities);
+    std::vector<TheoryQuery> queries;
+    for (const PreparedCell* member : members)
+      queries.push_back({member->kernel.get(), member->cell->quantity, member->range, &member->targets});
+    const std::vector<CellTheory> theory = compute_theory(*scene, queries);
     for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
   }
   for (PreparedCell& prepared : cells) {
@@ -179,20 +187,20 @@ struct Families {
 std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function<bool()>& stop) {
   // Far beyond the samples of any verdict, so that the streams are others.
   constexpr std::uint64_t kFirst = std::uint64_t{1} << 62;
-  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel,
+  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
                                    {kFirst, prepared.samples_per_ray, true}, nullptr, stop, [](double) {});
   if (!sampled || prepared.samples_per_ray < 2) return std::nullopt;
   Pilot pilot;
-  const auto channels = static_cast<std::size_t>(prepared.scene->reference->channels);
+  const std::size_t outputs = prepared.targets.outputs;
   const auto n = static_cast<Real>(prepared.samples_per_ray);
-  std::vector<Real> second(channels), fourth(channels), raw(channels);  // central moments, summed over the rays
+  std::vector<Real> second(outputs), fourth(outputs), raw(outputs);  // central moments, summed over the rays
   for (std::size_t i = 0; i < sampled->moments.size(); ++i) {
     const Moments& x = sampled->moments[i];
     const Real m = x.mean();
     pilot.variance.push_back(x.variance());
-    second[i % channels] += std::max<Real>(0, x.s2 - n * m * m);
-    fourth[i % channels] += std::max<Real>(0, x.s4 - 4 * m * x.s3 + 6 * m * m * x.s2 - 3 * n * m * m * m * m);
-    raw[i % channels] += x.s2;
+    second[i % outputs] += std::max<Real>(0, x.s2 - n * m * m);
+    fourth[i % outputs] += std::max<Real>(0, x.s4 - 4 * m * x.s3 + 6 * m * m * x.s2 - 3 * n * m * m * m * m);
+    raw[i % outputs] += x.s2;
   }
   for (std::size_t ray = 0; ray < sampled->lookups.size(); ++ray) {
     const Real mean = static_cast<Real>(sampled->lookups[ray]) / n;
@@ -201,9 +209,9 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function
   // Below this share of the raw moment a central one is rounding.
   constexpr Real kCancelled = 1e-6;
   const auto count = n * static_cast<Real>(sampled->lookups.size());
-  for (std::size_t c = 0; c < channels; ++c) {
-    const bool seen = second[c] > kCancelled * raw[c];
-    pilot.variance_of_variance = std::max(pilot.variance_of_variance, seen ? fourth[c] / (second[c] * second[c]) - 1 / count : 1);
+  for (std::size_t o = 0; o < outputs; ++o) {
+    const bool seen = second[o] > kCancelled * raw[o];
+    pilot.variance_of_variance = std::max(pilot.variance_of_variance, seen ? fourth[o] / (second[o] * second[o]) - 1 / count : 1);
   }
   return pilot;
 }
@@ -218,13 +226,11 @@ bool is_judged(const PreparedCell& prepared) {
 /// The tests of a cell; nothing for cells that claim nothing that could be tested.
 std::optional<CellGate> gate_of(PreparedCell& prepared, const GateLevels& levels, const std::function<bool()>& stop) {
   if (!is_judged(prepared)) return std::nullopt;
-  if (prepared.theory.ray_expected.empty())
-    prepared.theory.ray_expected = expected_of(*prepared.scene, *prepared.kernel, prepared.cell->quantity);
   const bool spread_missing = !prepared.theory.ray_lookups.empty() && prepared.theory.ray_lookups_variance.empty();
   std::optional<Pilot> pilot;
   if (prepared.theory.ray_variance.empty() || spread_missing) pilot = run_pilot(prepared, stop);
-  return plan_gate(prepared.planned(), *prepared.scene, prepared.range, prepared.claim,
-                   bounds_everywhere(*prepared.scene, *prepared.kernel), prepared.theory, pilot, levels);
+  return plan_gate(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim, prepared.theory, pilot,
+                   levels);
 }
 
 /// Looks at the evidence of the planned samples and draws further ones while the verdict is open, as many again each time, up to
@@ -239,10 +245,15 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
   verdict.lookups_family = families.lookups;
   verdict.laws_family = families.laws;
   const LawPolicy policy = prepared.cell->gate.laws;
-  const bool violates = prepared.needs_bound && !bounds_everywhere(*prepared.scene, *prepared.kernel);
-  if (gate.against == "reference" && !violates &&
-      (policy == LawPolicy::always || (policy == LawPolicy::undecided && !gate.undecidable.empty())))
-    verdict.laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop);
+  const bool violates = prepared.needs_bound && !prepared.scene->bounding, judged = gate.against == "reference" && !violates;
+  if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !gate.undecidable.empty())))
+    verdict.laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range,
+                             prepared.theory, {}, stop);
+  // Bins are coarse; where weights are 1 the distribution itself can be looked at.
+  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path &&
+      prepared.range == SampleRange::binary && prepared.scene->bounding)
+    for (const LawRecord& law : free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, {}, stop))
+      verdict.laws.push_back(law);
   verdict.alpha = levels.alpha;
   verdict.alpha_pass = levels.alpha_pass;
   verdict.planned = gate.planned;
@@ -265,14 +276,15 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
     for (std::size_t i = 0; i < gate.tests.size(); ++i)
       verdict.tests.push_back(test_record(
           gate.tests[i], evidence[i], gate.tests[i].channel == MeanTest::kLookups ? gate.lookups_per_sum : gate.errors_per_sum));
-    decide(verdict);
+    decide(verdict, prepared.targets.names);
     const Outcome mean = gate.against == "own mean" ? verdict.own_mean : verdict.unbiased;
     const bool open = mean == Outcome::inconclusive || (mean == Outcome::pass && verdict.lookups == Outcome::inconclusive);
     if (!open || verdict.samples_per_ray >= most) return verdict;
     constexpr std::uint64_t kRound = 64;
     const std::uint64_t left = (most - verdict.samples_per_ray + kRound - 1) / kRound * kRound;
     const SampleSpan span{verdict.samples_per_ray, std::min(verdict.samples_per_ray, left)};
-    const auto more = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, span, &gate, stop, progress);
+    const auto more =
+        sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, span, &gate, stop, progress);
     if (!more) return std::nullopt;
     effort += *more;
     for (std::size_t i = 0; i < evidence.size(); ++i) evidence[i] += more->evidence[i];
@@ -285,7 +297,6 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
 
 /// What the verdict of a cell can be expected to say, before anything is sampled.
 void foresee(const PreparedCell& prepared, const GateLevels& levels, Prediction& prediction) {
-  const bool bounding = bounds_everywhere(*prepared.scene, *prepared.kernel);
   prediction.most = prepared.samples_per_ray;
   if (!is_judged(prepared)) {
     prediction.verdict = "not judged";
@@ -295,11 +306,13 @@ void foresee(const PreparedCell& prepared, const GateLevels& levels, Prediction&
     prediction.verdict = "by a pilot";
     return;
   }
-  const CellGate gate = plan_gate(prepared.planned(), *prepared.scene, prepared.range, prepared.claim, bounding, prepared.theory,
-                                  std::nullopt, levels);
+  const CellGate gate = plan_gate(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim,
+                                  prepared.theory, std::nullopt, levels);
   prediction.planned = gate.planned;
   prediction.most = std::max(prediction.most, std::min(gate.affordable, gate.undecidable.empty() ? kPatience * gate.planned : 0));
-  prediction.verdict = prepared.needs_bound && !bounding ? "VIOLATED" : gate.undecidable.empty() ? "PASS" : "INCONCLUSIVE";
+  prediction.verdict = prepared.needs_bound && !prepared.scene->bounding ? "VIOLATED"
+                       : gate.undecidable.empty()                        ? "PASS"
+                                                                         : "INCONCLUSIVE";
 }
 
 std::optional<Real> finite(Real x) { return std::isfinite(x) ? std::optional(x) : std::nullopt; }
@@ -326,11 +339,12 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
 }
 
 void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled) {
-  const Scene& scene = *prepared.scene;
   const Cell& cell = *prepared.cell;
   const auto rays = static_cast<std::size_t>(record.rays);
   const auto n = static_cast<Real>(rays), samples = static_cast<Real>(record.cell.samples_per_ray);
-  const auto channels = static_cast<std::size_t>(record.channels);
+  const Targets& targets = prepared.targets;
+  const std::size_t outputs = targets.outputs;
+  record.outputs = targets.names;
   record.samples = sampled.counters.samples;
   record.lookups = sampled.counters.lookups;
   record.draws = sampled.counters.draws;
@@ -342,7 +356,7 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
   record.majorant_violations = sampled.counters.violations;
   if (sampled.counters.violations > 0) record.largest_violation = finite(sampled.counters.largest_violation);
   record.nonfinite = sampled.nonfinite;
-  record.reference_method = scene.reference->method + (cell.measurement == Measurement{} ? "" : ", measured");
+  record.reference_method = targets.method + (cell.measurement == Measurement{} ? "" : ", measured");
   record.status = Status::ok;
   if (sampled.nonfinite > 0) {
     record.status = Status::error;
@@ -352,12 +366,12 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
     record.reason = fmt::format("{} walks exceeded the bound on lookups", sampled.counters.overruns);
   }
   record.variance_basis = "sample";
-  for (std::size_t c = 0; c < channels; ++c) {
+  for (std::size_t o = 0; o < outputs; ++o) {
     Moments pooled;
     Real mean = 0, reference = 0, reference_square = 0, error = 0, bias = 0, squares = 0, variance = 0;
     for (std::size_t ray = 0; ray < rays; ++ray) {
-      const Moments& moments = sampled.moments[ray * channels + c];
-      const Real truth = sampled.reference[ray * channels + c];
+      const Moments& moments = sampled.moments[ray * outputs + o];
+      const Real truth = measured(targets.mean[ray * outputs + o], cell.measurement);
       pooled += moments;
       bias += moments.mean();
       squares += moments.mean() * moments.mean();
@@ -365,8 +379,7 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
       mean += truth + moments.mean();
       reference += truth;
       reference_square += truth * truth;
-      const Real depth_error = scene.reference->error[ray * channels + c];
-      error += cell.quantity == Quantity::transmittance ? truth * depth_error : depth_error;
+      error += targets.error[ray * outputs + o];
     }
     ChannelRecord out;
     out.mean = finite(mean / n);
@@ -375,9 +388,9 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
     out.bias = finite(bias / n);
     out.rmse = finite(std::sqrt(squares / n));
     if (record.cell.samples_per_ray > 1) out.variance = finite(variance / n);
-    if (c < prepared.theory.variance.size() && prepared.theory.variance[c]) {
-      out.variance_theory = finite(*prepared.theory.variance[c]);
-      out.rmse_theory = finite(std::sqrt(*prepared.theory.variance[c] / samples + prepared.theory.squared_bias[c].value_or(0)));
+    if (o < prepared.theory.variance.size() && prepared.theory.variance[o]) {
+      out.variance_theory = finite(*prepared.theory.variance[o]);
+      out.rmse_theory = finite(std::sqrt(*prepared.theory.variance[o] / samples + prepared.theory.squared_bias[o].value_or(0)));
       record.variance_basis = "analytic";
     }
     const std::optional<Real> best = out.variance_theory ? out.variance_theory : out.variance;
@@ -386,7 +399,7 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
     if (pooled.s2 > 0) out.kurtosis = finite(count * pooled.s4 / (pooled.s2 * pooled.s2));
     record.channel.push_back(out);
 
-    const std::vector<GroupErrors::Level>& levels = sampled.groups[c].levels();
+    const std::vector<GroupErrors::Level>& levels = sampled.groups[o].levels();
     for (std::size_t level = 0; level < levels.size(); ++level) {
       if (level >= record.convergence.size()) record.convergence.push_back({std::uint64_t{1} << level, {}, {}});
       const Real mean_square = levels[level].sum_of_squares / static_cast<Real>(levels[level].groups);
@@ -399,14 +412,14 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
 void write_images(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled, const RunOptions& options,
                   const RunObserver& observer) {
   const BuiltRays& rays = *prepared.scene->rays;
-  if (!prepared.cell->images || rays.width == 0 || options.image_directory.empty()) return;
+  if (!prepared.cell->images || !prepared.targets.names.empty() || rays.width == 0 || options.image_directory.empty()) return;
   const auto channels = static_cast<std::size_t>(record.channels);
-  const std::size_t shown = channels >= 3 ? 3 : 1;
+  const std::size_t shown = channels >= 3 ? 3 : 1, outputs = prepared.targets.outputs;
   std::vector<Real> mean, variance, reference, lookups;
   for (std::size_t ray = 0; ray < rays.world.size(); ++ray) {
     for (std::size_t c = 0; c < shown; ++c) {
-      const Moments& moments = sampled.moments[ray * channels + c];
-      reference.push_back(sampled.reference[ray * channels + c]);
+      const Moments& moments = sampled.moments[ray * outputs + c];
+      reference.push_back(measured(prepared.targets.mean[ray * outputs + c], prepared.cell->measurement));
       mean.push_back(reference.back() + moments.mean());
       variance.push_back(moments.variance());
     }
@@ -484,8 +497,8 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     } else {
       const auto progress = [&](double fraction) { observer.progress(record, fraction); };
       const std::optional<CellGate> gate = gate_of(prepared, plan.levels, stop);
-      const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, {0, prepared.samples_per_ray},
-                                       gate ? &*gate : nullptr, stop, progress);
+      const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
+                                       {0, prepared.samples_per_ray}, gate ? &*gate : nullptr, stop, progress);
       std::optional<VerdictRecord> verdict;
       if (sampled && gate) verdict = judge(prepared, *gate, *sampled, plan.levels, families, effort, stop, progress);
       if (!sampled || (gate && !verdict)) {
@@ -535,11 +548,8 @@ std::vector<Prediction> predict(const Plan& plan, const std::vector<bool>& selec
       prediction.samples_per_ray = prepared.samples_per_ray;
       prediction.lookups_per_sample = prepared.theory.lookups;
       Real squares = 0;
-      const Reference& reference = *prepared.scene->reference;
-      const auto channels = static_cast<std::size_t>(reference.channels);
-      for (std::size_t ray = 0; ray < prediction.rays; ++ray) {
-        const Real depth = reference.depth[ray * channels];
-        const Real truth = prepared.cell->quantity == Quantity::transmittance ? std::exp(-depth) : depth;
+      for (std::size_t ray = 0; prepared.reason.empty() && ray < prediction.rays; ++ray) {
+        const Real truth = prepared.targets.mean[ray * prepared.targets.outputs];
         squares += truth * truth;
       }
       if (!prepared.theory.variance.empty() && prepared.theory.variance[0] && squares > 0)

@@ -168,22 +168,21 @@ Real measured(Real value, const Measurement& measurement) {
   return value;
 }
 
-std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleSpan span,
-                                   const CellGate* gate, const std::function<bool()>& stop,
+std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
+                                   SampleSpan span, const CellGate* gate, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress) {
   const std::size_t rays = scene.rays->local.size();
-  const auto channels = static_cast<std::size_t>(scene.reference->channels);
+  const std::size_t outputs = targets.outputs;
   const std::uint64_t key = stream_key(cell, *scene.medium);
   const int level = chunk_level(rays, span.per_ray);
   const std::uint64_t whole_chunk = std::uint64_t{1} << level;
   const std::vector<Chunk> chunks = cut(rays, span.per_ray, whole_chunk);
 
   Sampled result;
-  result.moments.resize(rays * channels);
-  result.reference.resize(rays * channels);
+  result.moments.resize(rays * outputs);
   result.lookups.resize(rays);
   result.lookups_squared.resize(rays);
-  result.groups.resize(channels);
+  result.groups.resize(outputs);
 
   if (gate) result.evidence.resize(gate->tests.size());
 
@@ -207,19 +206,16 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     const Chunk& chunk = chunks[at];
     ChunkResult& out = results[at];
     Scratch& mine = scratch.local();
-    out.moments.resize((chunk.end_ray - chunk.first_ray) * channels);
+    out.moments.resize((chunk.end_ray - chunk.first_ray) * outputs);
     out.lookups.resize(chunk.end_ray - chunk.first_ray);
     out.lookups_squared.resize(chunk.end_ray - chunk.first_ray);
-    out.groups.resize(channels);
-    out.group_sums.assign(channels, 0);
+    out.groups.resize(outputs);
+    out.group_sums.assign(outputs, 0);
     const auto begun = Clock::now();
-    Evidences evidences(gate, channels, out.evidence);
+    Evidences evidences(gate, outputs, out.evidence);
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
       scene.context(ray, kernel, mine.context);
       kernel.begin_ray(*mine.workspace, *scene.medium->medium, scene.medium->extrema, mine.context);
-      const Spectrum expected = kernel.expected(*mine.workspace, scene.reference->at(ray), cell.quantity);
-      for (std::size_t c = 0; c < channels && chunk.first == 0; ++c)
-        result.reference[ray * channels + c] = measured(expected[static_cast<Eigen::Index>(c)], cell.measurement);
       const std::uint64_t lookups_before = out.counters.lookups;
       const std::size_t local = ray - chunk.first_ray;
       for (std::uint64_t drawn = 0; drawn < chunk.count && !stopped; drawn += kBatch) {
@@ -227,14 +223,14 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         const std::uint64_t batch = std::min(kBatch, chunk.count - drawn);
         kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, span.first + chunk.first + drawn, batch,
                       cell.quantity, mine.block, out.counters);
-        mine.errors.resize(batch * channels);
-        for (std::size_t c = 0; c < channels; ++c) {
-          Moments& moments = out.moments[local * channels + c];
-          const Real reference = measured(expected[static_cast<Eigen::Index>(c)], cell.measurement);
-          const Real shift = gate ? gate->shift[ray * channels + c] : 0;
+        mine.errors.resize(batch * outputs);
+        for (std::size_t o = 0; o < outputs; ++o) {
+          Moments& moments = out.moments[local * outputs + o];
+          const Real reference = measured(targets.mean[ray * outputs + o], cell.measurement);
+          const Real shift = gate ? gate->shift[ray * outputs + o] : 0;
           for (std::size_t i = 0; i < batch; ++i) {
-            const Real value = mine.block.values[i * channels + c];
-            mine.errors[c * batch + i] = 0;
+            const Real value = mine.block.values[i * outputs + o];
+            mine.errors[o * batch + i] = 0;
             if (!std::isfinite(value)) {
               ++out.nonfinite;
               continue;
@@ -243,20 +239,20 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
             const Real error = measured(value, cell.measurement) - reference;
             const Real counted = span.about_zero ? value : error;
             moments.add(counted);
-            out.groups[c].add(counted);
-            mine.errors[c * batch + i] = error - shift;
+            out.groups[o].add(counted);
+            mine.errors[o * batch + i] = error - shift;
           }
         }
         const auto judging = Clock::now();
-        for (std::size_t c = 0; c < channels && gate; ++c) evidences.add_errors(ray, c, {&mine.errors[c * batch], batch});
+        for (std::size_t o = 0; o < outputs && gate; ++o) evidences.add_errors(ray, o, {&mine.errors[o * batch], batch});
         evidences.add_lookups(ray, mine.block.lookups);
         out.judging += Clock::now() - judging;
         for (const std::uint32_t n : mine.block.lookups) out.lookups_squared[local] += static_cast<Real>(n) * n;
       }
       out.lookups[local] = out.counters.lookups - lookups_before;
-      for (std::size_t c = 0; c < channels; ++c) {
-        out.group_sums[c] = out.moments[local * channels + c].s1;
-        out.groups[c].finish_ray();
+      for (std::size_t o = 0; o < outputs; ++o) {
+        out.group_sums[o] = out.moments[local * outputs + o].s1;
+        out.groups[o].finish_ray();
       }
     }
     const auto judging = Clock::now();
@@ -267,21 +263,21 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   });
   if (stopped) return std::nullopt;
 
-  std::vector<GroupErrors> across(channels);  // groups larger than a chunk, within one ray
+  std::vector<GroupErrors> across(outputs);  // groups larger than a chunk, within one ray
   for (std::size_t at = 0; at < chunks.size(); ++at) {
     const Chunk& chunk = chunks[at];
     const ChunkResult& part = results[at];
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
-      for (std::size_t c = 0; c < channels; ++c)
-        result.moments[ray * channels + c] += part.moments[(ray - chunk.first_ray) * channels + c];
+      for (std::size_t o = 0; o < outputs; ++o)
+        result.moments[ray * outputs + o] += part.moments[(ray - chunk.first_ray) * outputs + o];
       result.lookups[ray] += part.lookups[ray - chunk.first_ray];
       result.lookups_squared[ray] += part.lookups_squared[ray - chunk.first_ray];
     }
-    for (std::size_t c = 0; c < channels; ++c) {
-      result.groups[c] += part.groups[c];
+    for (std::size_t o = 0; o < outputs; ++o) {
+      result.groups[o] += part.groups[o];
       if (span.per_ray <= whole_chunk) continue;
-      if (chunk.first == 0) across[c].finish_ray();
-      if (chunk.count == whole_chunk) across[c].carry(static_cast<std::size_t>(level), part.group_sums[c]);
+      if (chunk.first == 0) across[o].finish_ray();
+      if (chunk.count == whole_chunk) across[o].carry(static_cast<std::size_t>(level), part.group_sums[o]);
     }
     result.counters += part.counters;
     result.nonfinite += part.nonfinite;
@@ -292,64 +288,55 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   }
   if (span.per_ray > whole_chunk) {
     // A chunk's own groups already hold the level at which the chunks begin.
-    for (std::size_t c = 0; c < channels; ++c) result.groups[c].append_above(static_cast<std::size_t>(level), across[c]);
+    for (std::size_t o = 0; o < outputs; ++o) result.groups[o].append_above(static_cast<std::size_t>(level), across[o]);
   }
   return result;
 }
 
-std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<const Kernel*>& kernels,
-                                       const std::vector<Quantity>& quantities) {
-  const std::size_t rays = scene.rays->local.size(), count = kernels.size();
+RayProfile make_profile(const Medium& medium, const Ray& local, const SegmentBuffer& buffer) {
+  std::vector<Real> knots, ends, rates;
+  sorted_knots(medium, local, knots);
+  for (const Segment& segment : buffer.segments) {
+    ends.push_back(segment.end);
+    rates.push_back(segment.majorant);
+  }
+  return RayProfile(
+      [&medium, local](const Real* t, std::size_t n, Real* out) {
+        std::vector<Real> x(n), y(n), z(n);
+        for (std::size_t i = 0; i < n; ++i) {
+          const Vec3 p = local.at(t[i]);
+          x[i] = p.x(), y[i] = p.y(), z[i] = p.z();
+        }
+        medium.extinction({x.data(), y.data(), z.data(), n}, out);
+      },
+      medium.channels(), knots, ends, rates);
+}
+
+std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<TheoryQuery>& queries) {
+  const std::size_t rays = scene.rays->local.size(), count = queries.size();
   const auto channels = static_cast<std::size_t>(scene.reference->channels);
-  struct RayTheory {
-    Theory theory;
-    Real expected = 0;
-  };
-  std::vector<RayTheory> all(rays * count * channels);
+  std::vector<Theory> all(rays * count * channels);
   struct Memory {
     std::vector<std::unique_ptr<Workspace>> workspaces;
     RayContext context;
-    std::vector<Real> knots, ends, rates, x, y, z;
   };
   tbb::enumerable_thread_specific<Memory> memory([&] {
     Memory mine;
-    for (const Kernel* kernel : kernels) mine.workspaces.push_back(kernel->workspace());
+    for (const TheoryQuery& query : queries) mine.workspaces.push_back(query.kernel->workspace());
     return mine;
   });
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays, 8), [&](const auto& range) {
     Memory& mine = memory.local();
     for (std::size_t ray = range.begin(); ray < range.end(); ++ray) {
-      const Ray& local = scene.rays->local[ray];
       const Medium& medium = *scene.medium->medium;
-      const RayProfile::Lookup lookup = [&](const Real* t, std::size_t n, Real* out) {
-        mine.x.resize(n);
-        mine.y.resize(n);
-        mine.z.resize(n);
-        for (std::size_t i = 0; i < n; ++i) {
-          mine.x[i] = local.origin.x() + t[i] * local.direction.x();
-          mine.y[i] = local.origin.y() + t[i] * local.direction.y();
-          mine.z[i] = local.origin.z() + t[i] * local.direction.z();
-        }
-        medium.extinction({mine.x.data(), mine.y.data(), mine.z.data(), n}, out);
-      };
-      sorted_knots(medium, local, mine.knots);
       std::optional<RayProfile> profile;
       for (std::size_t k = 0; k < count; ++k) {
-        scene.context(ray, *kernels[k], mine.context);
-        if (!profile) {
-          mine.ends.clear();
-          mine.rates.clear();
-          for (const Segment& segment : mine.context.segments.segments) {
-            mine.ends.push_back(segment.end);
-            mine.rates.push_back(segment.majorant);
-          }
-          profile.emplace(lookup, static_cast<int>(channels), mine.knots, mine.ends, mine.rates);
-        }
-        kernels[k]->begin_ray(*mine.workspaces[k], medium, scene.medium->extrema, mine.context);
-        const std::vector<Theory> theory = kernels[k]->theory(*mine.workspaces[k], *profile, quantities[k]);
-        const Spectrum expected = kernels[k]->expected(*mine.workspaces[k], scene.reference->at(ray), quantities[k]);
-        for (std::size_t c = 0; c < channels; ++c)
-          all[(ray * count + k) * channels + c] = {theory[c], expected[static_cast<Eigen::Index>(c)]};
+        const Kernel& kernel = *queries[k].kernel;
+        scene.context(ray, kernel, mine.context);
+        if (!profile) profile.emplace(make_profile(medium, scene.rays->local[ray], mine.context.segments));
+        kernel.begin_ray(*mine.workspaces[k], medium, scene.medium->extrema, mine.context);
+        const std::vector<Theory> theory = kernel.theory(*mine.workspaces[k], *profile, queries[k].quantity);
+        for (std::size_t c = 0; c < channels; ++c) all[(ray * count + k) * channels + c] = theory[c];
       }
     }
   });
@@ -359,69 +346,53 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<con
   const auto finite = [](const std::optional<Real>& x) { return x && std::isfinite(*x); };
   for (std::size_t k = 0; k < count; ++k) {
     CellTheory& cell = result[k];
+    const Targets& targets = *queries[k].targets;
+    const std::size_t outputs = targets.outputs;
+    const bool one_per_channel = targets.names.empty();
+    // Scores that are 0 or 1 have the variance of a coin; a free path's last output is its weight.
+    const bool coins = !one_per_channel && queries[k].range == SampleRange::binary && scene.bounding;
     bool all_variances = true, all_lookups = true, all_spreads = true;
-    cell.ray_expected.resize(rays * channels);
-    cell.ray_shift.resize(rays * channels);
-    cell.ray_variance.resize(rays * channels);
+    cell.ray_shift.assign(rays * outputs, 0);
+    cell.ray_variance.resize(rays * outputs);
     cell.ray_lookups.resize(rays);
     cell.ray_lookups_variance.resize(rays);
-    for (std::size_t c = 0; c < channels; ++c) {
-      Real variance = 0, bias = 0, squared = 0, lookups = 0;
+    for (std::size_t o = 0; o < outputs; ++o) {
+      const bool is_weight = queries[k].quantity == Quantity::free_path && o + channels >= outputs;
+      Real variance = 0, bias = 0, squared = 0;
       bool known = true;
       for (std::size_t ray = 0; ray < rays; ++ray) {
-        const auto& [theory, expected] = all[(ray * count + k) * channels + c];
+        const Real expected = targets.mean[ray * outputs + o];
+        Theory theory;
+        if (one_per_channel || is_weight) theory = all[(ray * count + k) * channels + o % channels];
+        if (coins) theory.variance = expected * (1 - expected);
         const Real gap = theory.mean ? *theory.mean - expected : 0;
-        cell.ray_expected[ray * channels + c] = expected;
-        cell.ray_shift[ray * channels + c] = gap;
-        cell.ray_variance[ray * channels + c] = theory.variance.value_or(0);
+        cell.ray_shift[ray * outputs + o] = gap;
+        cell.ray_variance[ray * outputs + o] = theory.variance.value_or(0);
         known = known && finite(theory.variance);
         variance += theory.variance.value_or(0);
         bias += gap;
         squared += gap * gap;
-        if (c > 0) continue;
-        all_lookups = all_lookups && finite(theory.lookups);
-        all_spreads = all_spreads && finite(theory.lookups_variance);
-        lookups += cell.ray_lookups[ray] = theory.lookups.value_or(0);
-        cell.ray_lookups_variance[ray] = theory.lookups_variance.value_or(0);
       }
       all_variances = all_variances && known;
       const auto where_known = [&](Real x) { return known ? std::optional(x / n) : std::nullopt; };
       cell.variance.push_back(where_known(variance));
       cell.bias.push_back(where_known(bias));
       cell.squared_bias.push_back(where_known(squared));
-      if (c == 0 && all_lookups) cell.lookups = lookups / n;
     }
+    Real lookups = 0;
+    for (std::size_t ray = 0; ray < rays; ++ray) {
+      const Theory& theory = all[(ray * count + k) * channels];
+      all_lookups = all_lookups && finite(theory.lookups);
+      all_spreads = all_spreads && finite(theory.lookups_variance);
+      lookups += cell.ray_lookups[ray] = theory.lookups.value_or(0);
+      cell.ray_lookups_variance[ray] = theory.lookups_variance.value_or(0);
+    }
+    if (all_lookups) cell.lookups = lookups / n;
     if (!all_variances) cell.ray_variance.clear();
     if (!all_lookups) cell.ray_lookups.clear();
     if (!all_spreads) cell.ray_lookups_variance.clear();
   }
   return result;
-}
-
-std::vector<Real> expected_of(const Scene& scene, const Kernel& kernel, Quantity quantity) {
-  const std::size_t rays = scene.rays->local.size();
-  const auto channels = static_cast<std::size_t>(scene.reference->channels);
-  std::vector<Real> result(rays * channels);
-  const auto workspace = kernel.workspace();
-  RayContext context;
-  for (std::size_t ray = 0; ray < rays; ++ray) {
-    scene.context(ray, kernel, context);
-    kernel.begin_ray(*workspace, *scene.medium->medium, scene.medium->extrema, context);
-    const Spectrum expected = kernel.expected(*workspace, scene.reference->at(ray), quantity);
-    for (std::size_t c = 0; c < channels; ++c) result[ray * channels + c] = expected[static_cast<Eigen::Index>(c)];
-  }
-  return result;
-}
-
-bool bounds_everywhere(const Scene& scene, const Kernel& kernel) {
-  constexpr Real kSlack = 1e-9;
-  RayContext context;
-  for (std::size_t ray = 0; ray < scene.rays->local.size(); ++ray) {
-    scene.context(ray, kernel, context);
-    for (const Segment& segment : context.segments.segments)
-      if (segment.extinction.maximum.maxCoeff() > segment.majorant * (1 + kSlack)) return false;
-  }
-  return true;
 }
 
 }  // namespace nullmark

@@ -28,6 +28,50 @@ std::shared_ptr<const Medium> build_field(const MediumSpec& spec) {
 
 constexpr Real kEpsilon = std::numeric_limits<Real>::epsilon();
 
+/// Ends of cells in which a collision, averaged over the channels, is about equally probable.  A trapezoidal table of the optical
+/// depth decides where they lie; what lies between them is integrated exactly afterwards.
+void place_equally_probable(const Medium& medium, const Ray& local, std::span<Real> ends) {
+  constexpr std::size_t kTable = 1024;
+  const auto channels = static_cast<std::size_t>(medium.channels());
+  const auto at = [&](std::size_t i) { return local.begin + local.length() * static_cast<Real>(i) / static_cast<Real>(kTable); };
+  std::vector<Real> x(kTable + 1), y(kTable + 1), z(kTable + 1), mu((kTable + 1) * channels);
+  for (std::size_t i = 0; i <= kTable; ++i) {
+    const Vec3 p = local.at(at(i));
+    x[i] = p.x(), y[i] = p.y(), z[i] = p.z();
+  }
+  medium.extinction({x.data(), y.data(), z.data(), kTable + 1}, mu.data());
+  std::vector<Real> depth(channels, 0), before(channels, 0);
+  const auto collided = [&](Real part) {
+    Real sum = 0;
+    for (std::size_t c = 0; c < channels; ++c) sum -= std::expm1(-(before[c] + part * (depth[c] - before[c])));
+    return sum / static_cast<Real>(channels);
+  };
+  std::vector<Real> probability(kTable + 1, 0);
+  const Real step = local.length() / static_cast<Real>(kTable);
+  const auto advance = [&](std::size_t i) {
+    before = depth;
+    for (std::size_t c = 0; c < channels; ++c) {
+      const Real mean = (mu[(i - 1) * channels + c] + mu[i * channels + c]) / 2;
+      if (std::isfinite(mean)) depth[c] += mean * step;
+    }
+  };
+  for (std::size_t i = 1; i <= kTable; ++i) {
+    advance(i);
+    probability[i] = collided(1);
+  }
+  std::fill(depth.begin(), depth.end(), Real{0});
+  ends.front() = local.begin;
+  std::size_t cell = 0;
+  for (std::size_t j = 1; j + 1 < ends.size(); ++j) {
+    const Real wanted = probability[kTable] * static_cast<Real>(j) / static_cast<Real>(ends.size() - 1);
+    while (cell < kTable && (cell == 0 || probability[cell] < wanted)) advance(++cell);
+    Real low = 0, high = 1;  // within the cell the optical depth grows evenly, the probability does not
+    for (int i = 0; i < 40; ++i) (collided((low + high) / 2) < wanted ? low : high) = (low + high) / 2;
+    ends[j] = std::max(ends[j - 1], at(cell - 1) + low * step);
+  }
+  ends.back() = local.end;
+}
+
 }  // namespace
 
 BuiltMedium build_medium(const MediumSpec& spec) {
@@ -144,16 +188,65 @@ Reference compute_reference(const BuiltMedium& medium, const BuiltRays& rays) {
   return reference;
 }
 
+Marks compute_marks(const BuiltMedium& medium, const BuiltRays& rays, Quantity quantity) {
+  const bool equidistant = quantity == Quantity::transmittance_profile;
+  const auto channels = static_cast<std::size_t>(medium.medium->channels());
+  Marks marks;
+  marks.per_ray = equidistant ? kProfileMarks : kFreePathCells + 1;
+  marks.distance.resize(rays.local.size() * marks.per_ray);
+  marks.depth.resize(marks.distance.size() * channels);
+  marks.error.resize(marks.depth.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.local.size(), 4), [&](const auto& range) {
+    for (std::size_t r = range.begin(); r < range.end(); ++r) {
+      const Ray& local = rays.local[r];
+      Real* distance = &marks.distance[r * marks.per_ray];
+      if (equidistant)
+        for (std::size_t j = 0; j < kProfileMarks; ++j)
+          distance[j] = j + 1 == kProfileMarks
+                            ? local.end
+                            : local.begin + local.length() * static_cast<Real>(j + 1) / static_cast<Real>(kProfileMarks);
+      else
+        place_equally_probable(*medium.medium, local, {distance, marks.per_ray});
+      Ray part = local;
+      Spectrum depth = Spectrum::Zero(medium.medium->channels()), error = depth;
+      for (std::size_t j = 0; j < marks.per_ray; ++j) {
+        part.end = distance[j];
+        const DepthWithError added = optical_depth(*medium.medium, part);
+        depth += added.depth;
+        error += added.error;
+        part.begin = distance[j];
+        for (std::size_t c = 0; c < channels; ++c) {
+          marks.depth[(r * marks.per_ray + j) * channels + c] = depth[static_cast<Eigen::Index>(c)];
+          marks.error[(r * marks.per_ray + j) * channels + c] = error[static_cast<Eigen::Index>(c)];
+        }
+      }
+    }
+  });
+  return marks;
+}
+
 void Scene::context(std::size_t ray, const Kernel& kernel, RayContext& out) const {
   out.world = rays->world[ray];
   out.local = rays->local[ray];
   out.index = static_cast<std::uint32_t>(ray);
   out.albedo = medium->albedo;
   majorant->segments(out.world, out.local, out.segments);
+  out.marks = {};
+  if (marks) out.marks = {&marks->distance[ray * marks->per_ray], marks->per_ray};
   out.knots.clear();
   out.exact_depth.reset();
   if (kernel.needs_knots()) sorted_knots(*medium->medium, out.local, out.knots);
   if (kernel.needs_optical_depth()) out.exact_depth = optical_depth(*medium->medium, out.local).depth;
+}
+
+bool bounds_everywhere(const MajorantStructure& majorant, const BuiltRays& rays) {
+  SegmentBuffer buffer;
+  for (std::size_t ray = 0; ray < rays.local.size(); ++ray) {
+    majorant.segments(rays.world[ray], rays.local[ray], buffer);
+    for (const Segment& segment : buffer.segments)
+      if (exceeds(segment.extinction.maximum.maxCoeff(), segment.majorant)) return false;
+  }
+  return true;
 }
 
 std::uint64_t stream_key(const Cell& cell, const BuiltMedium& medium) {

@@ -49,6 +49,17 @@ struct DepthWithError {
 };
 DepthWithError optical_depth(const Medium& medium, const Ray& local);
 
+/// Distances on every ray with the exact optical depth from the ray's begin to each, and a bound on its error.
+struct Marks {
+  std::size_t per_ray = 0;
+  std::vector<Real> distance;      ///< [ray * per_ray + j], ascending
+  std::vector<Real> depth, error;  ///< [(ray * per_ray + j) * channels + c]
+};
+
+/// kProfileMarks marks at equal distances up to the ray's end (transmittance_profile), or the kFreePathCells + 1 ends of cells in
+/// which a collision is about equally probable (free_path).
+Marks compute_marks(const BuiltMedium& medium, const BuiltRays& rays, Quantity quantity);
+
 /// begin, the medium's knots in between, end; sorted, without repetitions.
 void sorted_knots(const Medium& medium, const Ray& local, std::vector<Real>& out);
 
@@ -58,10 +69,15 @@ struct Scene {
   std::shared_ptr<const MajorantStructure> majorant;
   std::shared_ptr<const BuiltRays> rays;
   std::shared_ptr<const Reference> reference;
+  std::shared_ptr<const Marks> marks;  ///< of quantities that are told at distances; null otherwise
+  bool bounding = true;                ///< the majorant bounds the extinction in every segment of every ray
 
   /// Fills the context of a ray with what the kernel needs.
   void context(std::size_t ray, const Kernel& kernel, RayContext& out) const;
 };
+
+/// Whether the majorant bounds the extinction in every segment of every ray.
+bool bounds_everywhere(const MajorantStructure& majorant, const BuiltRays& rays);
 
 /// Key of the random streams: the same for all estimators of a medium and seed, unless the cell asks for streams of its own.
 std::uint64_t stream_key(const Cell& cell, const BuiltMedium& medium);

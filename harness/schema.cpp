@@ -84,7 +84,7 @@ Json pattern_schema() {
 }
 
 Json definitions() {
-  const Json quantity = {{"enum", {to_string(Quantity::transmittance), to_string(Quantity::optical_depth)}}};
+  const Json quantity = {{"enum", quantity_names()}};
   const Json measurement =
       closed_object({{"clamp", described({{"type", "boolean"}, {"default", false}}, "every sample to [0,1]")},
                      {"quantise_bits", described({{"type", "integer"}, {"minimum", 0}, {"maximum", 31}, {"default", 0}},
@@ -174,8 +174,9 @@ Json cell_schema() {
        {"medium", typed_schema()},
        {"majorant", typed_schema()},
        {"ray_set", typed_schema()},
-       {"quantity", {{"enum", {to_string(Quantity::transmittance), to_string(Quantity::optical_depth)}}}},
+       {"quantity", {{"enum", quantity_names()}}},
        {"channels", {{"type", "integer"}, {"minimum", 1}, {"maximum", kMaxChannels}}},
+       {"outputs", described(list_of(text), "what each entry of the statistics is, where not a channel")},
        {"effects", list_of(text)},
        {"rays", whole(0)},
        {"samples_per_ray", whole(0)},

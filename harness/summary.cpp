@@ -112,7 +112,7 @@ Summary summarise(RunRecord& run) {
   for (CellRecord& record : run.cells) {
     if (record.verdict && record.status == Status::ok) {
       const VerdictRecord before = *record.verdict;
-      decide(*record.verdict);
+      decide(*record.verdict, record.outputs);
       const VerdictRecord& after = *record.verdict;
       summary.altered += before.unbiased != after.unbiased || before.own_mean != after.own_mean ||
                          before.lookups != after.lookups || before.lawful != after.lawful;

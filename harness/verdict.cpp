@@ -8,9 +8,10 @@
 namespace nullmark {
 namespace {
 
-std::string place_of(const TestRecord& test) {
+std::string place_of(const TestRecord& test, const std::vector<std::string>& outputs) {
   if (test.channel < 0) return "lookups";
-  std::string text = fmt::format("channel {}", test.channel);
+  const auto output = static_cast<std::size_t>(test.channel);
+  const std::string text = output < outputs.size() ? outputs[output] : fmt::format("channel {}", test.channel);
   return test.group < 0 ? text : fmt::format("{}, ray group {}", text, test.group);
 }
 
@@ -25,7 +26,7 @@ Outcome decide(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
   return proven && test.reference_error <= 0.25 * test.epsilon ? Outcome::pass : Outcome::inconclusive;
 }
 
-void decide(VerdictRecord& verdict) {
+void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
   verdict.unbiased = verdict.own_mean = Outcome::none;
   Outcome& outcome = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
   const Real alpha = verdict.alpha / static_cast<Real>(verdict.family);
@@ -62,15 +63,15 @@ void decide(VerdictRecord& verdict) {
     verdict.reason = fmt::format("{} samples lie outside the declared range", verdict.out_of_range);
   } else if (failed) {
     outcome = Outcome::fail;
-    verdict.reason =
-        failed->basis == "deterministic"
-            ? fmt::format("{}: a sample is off by {:.3g}, rounding allows {:.3g}", place_of(*failed), failed->largest_error,
-                          failed->rounding + failed->reference_error)
-            : fmt::format("{}: log E = {:.1f}, {:.1f} proves bias", place_of(*failed), failed->log_e_fail, -std::log(alpha));
+    verdict.reason = failed->basis == "deterministic"
+                         ? fmt::format("{}: a sample is off by {:.3g}, rounding allows {:.3g}", place_of(*failed, outputs),
+                                       failed->largest_error, failed->rounding + failed->reference_error)
+                         : fmt::format("{}: log E = {:.1f}, {:.1f} proves bias", place_of(*failed, outputs), failed->log_e_fail,
+                                       -std::log(alpha));
   } else if (open) {
     outcome = Outcome::inconclusive;
     if (!verdict.planned_undecidable)
-      verdict.reason = fmt::format("{}: undecided after {} samples a ray; {} were planned", place_of(*open),
+      verdict.reason = fmt::format("{}: undecided after {} samples a ray; {} were planned", place_of(*open, outputs),
                                    verdict.samples_per_ray, verdict.planned);
   } else {
     outcome = Outcome::pass;

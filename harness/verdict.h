@@ -9,6 +9,7 @@ namespace nullmark {
 Outcome decide(const TestRecord& test, Real alpha_fail, Real alpha_pass);
 
 /// Fills in the outcomes of all tests of a verdict and what follows for the cell, from the figures in the record alone.
-void decide(VerdictRecord& verdict);
+/// `outputs` are the names of what is tested, where it is not channels.
+void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs = {});
 
 }  // namespace nullmark

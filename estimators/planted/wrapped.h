@@ -13,6 +13,7 @@ class WrappedKernel : public Kernel {
   bool needs_knots() const override { return inner_->needs_knots(); }
   bool states_theory() const override { return inner_->states_theory(); }
   bool answers(Quantity quantity) const override { return inner_->answers(quantity); }
+  std::size_t outputs(Quantity quantity, const RayContext& context) const override { return inner_->outputs(quantity, context); }
   std::unique_ptr<Workspace> workspace() const override { return inner_->workspace(); }
   void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const RayContext& context) const override {
     inner_->begin_ray(workspace, medium, extrema, context);

@@ -15,6 +15,12 @@ struct Segment {
   Extrema extinction;  ///< per channel, without the looseness
 };
 
+/// Whether an extinction is above its bound, beyond the rounding of either.
+inline bool exceeds(Real extinction, Real bound) {
+  constexpr Real kRounding = 1e-9;
+  return extinction > bound * (1 + kRounding);
+}
+
 /// What a majorant structure makes of a ray: contiguous segments from ray.begin to ray.end.
 struct SegmentBuffer {
   std::vector<Segment> segments;
