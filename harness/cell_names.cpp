@@ -10,12 +10,13 @@
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 #include "harness/spec_json.h"
+#include "harness/transport_json.h"
 
 namespace nullmark {
 namespace {
 
 /// What may tell cells of an experiment apart beside estimator, medium and majorant.
-std::array<std::string, 6> distinctions(const Plan& plan, const Cell& cell) {
+std::array<std::string, 7> distinctions(const Plan& plan, const Cell& cell) {
   const Measurement& measurement = cell.measurement;
   std::string measured = measurement.clamp ? "clamped" : "unclamped";
   if (measurement.quantise_bits > 0) measured += fmt::format("/quantise_bits:{}", measurement.quantise_bits);
@@ -25,6 +26,7 @@ std::array<std::string, 6> distinctions(const Plan& plan, const Cell& cell) {
       plan.ray_sets[cell.rays].label,
       cell.equal_lookups ? fmt::format("equal_lookups:{}", *cell.equal_lookups) : fmt::format("samples:{}", cell.samples_per_ray),
       measured,
+      transport_label(cell.transport),
       cell.own_streams ? "own_streams" : "common_streams"};
 }
 
@@ -44,11 +46,12 @@ void add_experiments_where_needed(Plan& plan) {
 }
 
 void add_distinctions(const Plan& plan, const std::vector<Cell*>& cells) {
-  std::vector<std::array<std::string, 6>> words;
+  std::vector<std::array<std::string, 7>> words;
   for (const Cell* cell : cells) words.push_back(distinctions(plan, *cell));
   for (std::size_t i = 0; i < words[0].size(); ++i) {
     if (std::all_of(words.begin(), words.end(), [&](const auto& own) { return own[i] == words[0][i]; })) continue;
-    for (std::size_t c = 0; c < cells.size(); ++c) cells[c]->name += "/" + words[c][i];
+    for (std::size_t c = 0; c < cells.size(); ++c)
+      if (!words[c][i].empty()) cells[c]->name += "/" + words[c][i];
   }
 }
 

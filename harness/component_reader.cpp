@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/transport_json.h"
+
 namespace nullmark {
 namespace {
 
@@ -95,6 +97,9 @@ std::string read_type(ComponentKind kind, const Place& place) {
   return type.one_of(names, to_string(kind));
 }
 
+/// Keys that any medium takes beside its type's own.
+const std::vector<std::string> kMatterKeys = {"albedo", "anisotropy", "emission", "optional"};
+
 /// Components with the values that are given; `extra` keys are someone else's.
 std::vector<Component> read_given(ComponentKind kind, const Place& place, const std::vector<std::string>& extra = {}) {
   Component first;
@@ -129,11 +134,25 @@ void complete(ComponentKind kind, Component& component) {
   component.label = make_label(component.type, component.values, parameters);
 }
 
+void complete(MediumSpec& medium);
+
+void add_matter_label(MediumSpec& medium) {
+  if (!medium.albedo.empty()) medium.label += "/albedo:" + to_text(medium.albedo);
+  if (medium.anisotropy != 0) medium.label += "/anisotropy:" + to_text(medium.anisotropy);
+  if (!medium.emission.empty()) medium.label += "/emission:" + to_text(medium.emission);
+  for (MediumSpec& field : medium.emission_field) {
+    complete(field);
+    medium.optional |= field.optional;
+    medium.label += fmt::format("({})", field.label);
+  }
+}
+
 void complete(MediumSpec& medium) {
   if (medium.per_channel.empty()) {
     complete(ComponentKind::medium, medium.field);
     medium.label = medium.field.label;
     if (!medium.spectrum.empty()) medium.label += "/spectrum:" + to_text(medium.spectrum);
+    add_matter_label(medium);
     return;
   }
   for (MediumSpec& channel : medium.per_channel) {
@@ -143,6 +162,45 @@ void complete(MediumSpec& medium) {
   }
   medium.label += ")";
   medium.field.label = medium.label;
+  add_matter_label(medium);
+}
+
+std::vector<MediumSpec> read_given_media(const Place& place);
+
+Real read_anisotropy(const Place& place) {
+  const Real g = place.number();
+  if (!(g > -1 && g < 1)) place.expected("a mean cosine between -1 and 1");
+  return g;
+}
+
+/// What the media do to light beside removing it.
+std::vector<MediumSpec> with_matter(std::vector<MediumSpec> media, const Place& place) {
+  if (!place.json().is_object()) return media;
+  if (place.has("albedo")) {
+    std::vector<std::vector<Real>> albedos;
+    for (const Place& albedo : swept(place["albedo"], true)) albedos.push_back(read_per_channel(albedo, 1));
+    media = crossed(media, albedos, [](MediumSpec& medium, const std::vector<Real>& albedo) { medium.albedo = albedo; });
+  }
+  if (place.has("anisotropy")) {
+    std::vector<Real> cosines;
+    for (const Place& g : swept(place["anisotropy"], false)) cosines.push_back(read_anisotropy(g));
+    media = crossed(media, cosines, [](MediumSpec& medium, Real g) { medium.anisotropy = g; });
+  }
+  if (!place.has("emission")) return media;
+  const Place emission = place["emission"];
+  if (!emission.json().is_object()) {
+    for (MediumSpec& medium : media) medium.emission = read_per_channel(emission, kInfinity);
+    return media;
+  }
+  emission.expect_keys({"radiance", "field"});
+  for (MediumSpec& medium : media) medium.emission = read_per_channel(emission["radiance"], kInfinity);
+  if (!emission.has("field")) return media;
+  std::vector<MediumSpec> fields = read_given_media(emission["field"]);
+  if (fields.size() != 1) emission["field"].expected("one medium, not a sweep");
+  if (!fields[0].spectrum.empty() || !fields[0].per_channel.empty())
+    emission["field"].fail("a field of emission must be grey; its radiance may differ by channel");
+  for (MediumSpec& medium : media) medium.emission_field = fields;
+  return media;
 }
 
 std::vector<MediumSpec> read_given_media(const Place& place) {
@@ -152,7 +210,9 @@ std::vector<MediumSpec> read_given_media(const Place& place) {
 
   if (read_type(ComponentKind::medium, place) == kChannels) {
     if (!place.json().is_object()) place.expected("an object with \"type\" and \"media\"");
-    place.expect_keys({"type", "media", "optional"});
+    std::vector<std::string> keys = kMatterKeys;
+    keys.insert(keys.end(), {"type", "media"});
+    place.expect_keys(keys);
     const std::vector<Place> channels = place["media"].elements();
     if (channels.empty() || channels.size() > kMaxChannels)
       place["media"].expected(fmt::format("1 to {} media, one per channel", kMaxChannels));
@@ -165,10 +225,12 @@ std::vector<MediumSpec> read_given_media(const Place& place) {
       media =
           crossed(media, variants, [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
     }
-    return media;
+    return with_matter(media, place);
   }
 
-  const std::vector<Component> fields = read_given(ComponentKind::medium, place, {"spectrum", "optional"});
+  std::vector<std::string> keys = kMatterKeys;
+  keys.emplace_back("spectrum");
+  const std::vector<Component> fields = read_given(ComponentKind::medium, place, keys);
   media = crossed(media, fields, [](MediumSpec& medium, const Component& field) { medium.field = field; });
   if (place.json().is_object() && place.has("spectrum")) {
     std::vector<std::vector<Real>> spectra;
@@ -176,7 +238,7 @@ std::vector<MediumSpec> read_given_media(const Place& place) {
       spectra.push_back(numbers_within(spectrum, 1, kMaxChannels, Range::non_negative(), ""));
     media = crossed(media, spectra, [](MediumSpec& medium, const std::vector<Real>& spectrum) { medium.spectrum = spectrum; });
   }
-  return media;
+  return with_matter(media, place);
 }
 
 }  // namespace
@@ -226,6 +288,9 @@ bool matches(const Component& pattern, const Component& component) {
 bool matches(const MediumSpec& pattern, const MediumSpec& medium) {
   if (!matches(pattern.field, medium.field)) return false;
   if (!pattern.spectrum.empty() && pattern.spectrum != medium.spectrum) return false;
+  if (!pattern.albedo.empty() && pattern.albedo != medium.albedo) return false;
+  if (pattern.anisotropy != 0 && pattern.anisotropy != medium.anisotropy) return false;
+  if (!pattern.emission.empty() && pattern.emission != medium.emission) return false;
   return pattern.per_channel.empty() ||
          std::equal(pattern.per_channel.begin(), pattern.per_channel.end(), medium.per_channel.begin(), medium.per_channel.end(),
                     [](const MediumSpec& a, const MediumSpec& b) { return matches(a, b); });

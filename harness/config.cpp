@@ -17,6 +17,7 @@
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/spec_json.h"
+#include "harness/transport_json.h"
 
 namespace nullmark {
 namespace {
@@ -35,8 +36,8 @@ using Test = std::function<bool(const Draft&)>;
 
 constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
 
-const std::vector<std::string> kAxes = {"estimator",       "medium",        "majorant", "rays",       "quantity",
-                                        "samples_per_ray", "equal_lookups", "seed",     "measurement"};
+const std::vector<std::string> kAxes = {"estimator",       "medium",        "majorant", "rays",        "quantity",
+                                        "samples_per_ray", "equal_lookups", "seed",     "measurement", "transport"};
 const std::vector<std::string> kSingle = {"images", "image_maximum", "own_streams", "gate"};
 
 std::vector<std::string> joined(std::vector<std::string> a, const std::vector<std::string>& b) {
@@ -115,6 +116,8 @@ std::vector<Setter> read_axis(const std::string& key, const Place& place) {
   if (key == "quantity") return setters(each(place, read_quantity), [](Draft& d, Quantity q) { d.cell.quantity = q; });
   if (key == "measurement")
     return setters(each(place, read_measurement), [](Draft& d, const Measurement& m) { d.cell.measurement = m; });
+  if (key == "transport")
+    return setters(each(place, read_transport), [](Draft& d, const TransportSpec& t) { d.cell.transport = t; });
   if (key == "seed") {
     const auto read = [](const Place& at) { return at.unsigned_integer(0, kAny); };
     return setters(each(place, read), [](Draft& d, std::uint64_t seed) { d.cell.seed = seed; });
@@ -178,6 +181,8 @@ Test read_test(const std::string& key, const Place& place) {
   if (key == "measurement")
     return any_matches(each(place, read_measurement),
                        [](const Draft& d, const Measurement& m) { return d.cell.measurement == m; });
+  if (key == "transport")
+    return any_matches(each(place, read_transport), [](const Draft& d, const TransportSpec& t) { return d.cell.transport == t; });
   if (key == "seed")
     return any_matches(each(place, [](const Place& at) { return at.unsigned_integer(0, kAny); }),
                        [](const Draft& d, std::uint64_t seed) { return d.cell.seed == seed; });
@@ -344,8 +349,9 @@ class PlanBuilder {
 bool same_statistics(const Draft& a, const Draft& b) {
   return a.cell.experiment == b.cell.experiment && a.estimator == b.estimator && a.medium == b.medium &&
          a.majorant == b.majorant && a.rays == b.rays && a.cell.quantity == b.cell.quantity &&
-         a.cell.measurement == b.cell.measurement && a.cell.samples_per_ray == b.cell.samples_per_ray &&
-         a.cell.equal_lookups == b.cell.equal_lookups && a.cell.seed == b.cell.seed && a.cell.own_streams == b.cell.own_streams;
+         a.cell.measurement == b.cell.measurement && a.cell.transport == b.cell.transport &&
+         a.cell.samples_per_ray == b.cell.samples_per_ray && a.cell.equal_lookups == b.cell.equal_lookups &&
+         a.cell.seed == b.cell.seed && a.cell.own_streams == b.cell.own_streams;
 }
 
 TimingPlan read_timing(const Place& place) {

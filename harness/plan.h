@@ -31,12 +31,41 @@ struct MediumSpec {
   Component field;             ///< type "channels" when `per_channel` is not empty
   std::vector<Real> spectrum;  ///< empty: grey
   std::vector<MediumSpec> per_channel;
-  bool optional = false;  ///< a missing data file skips the cells instead of failing the run
+  std::vector<Real> albedo;                ///< mu_s / mu, one for all channels or one each; empty: nothing scatters
+  Real anisotropy = 0;                     ///< mean cosine of the Henyey-Greenstein phase function, in (-1, 1)
+  std::vector<Real> emission;              ///< radiance, one for all channels or one each; empty: nothing is emitted
+  std::vector<MediumSpec> emission_field;  ///< at most one, grey: scales the emission in space
+  bool optional = false;                   ///< a missing data file skips the cells instead of failing the run
   std::string label;
 
   bool operator==(const MediumSpec& other) const {
-    return field == other.field && spectrum == other.spectrum && per_channel == other.per_channel;
+    return field == other.field && spectrum == other.spectrum && per_channel == other.per_channel && albedo == other.albedo &&
+           anisotropy == other.anisotropy && emission == other.emission && emission_field == other.emission_field;
   }
+};
+
+/// An opaque black surface: it ends free paths, and emits.
+struct SurfaceSpec {
+  std::string type = "plane";       ///< "plane", "box" or "sphere"
+  std::array<Real, 3> point{};      ///< on the plane; the box's low corner; the sphere's centre
+  std::array<Real, 3> direction{};  ///< the plane's normal; the box's high corner
+  Real radius = 1;
+  std::vector<Real> radiance;  ///< one for all channels or one each; empty: 0
+
+  bool operator==(const SurfaceSpec&) const = default;
+};
+
+/// What light meets beside the medium, and how paths are sampled (harness/path_kernel.h).
+struct TransportSpec {
+  std::vector<Real> environment;  ///< radiance, one for all channels or one each; empty: 0
+  std::vector<SurfaceSpec> surfaces;
+  std::string next_event = "off";        ///< "off", "phase" or "uniform"
+  std::optional<int> roulette_from = 4;  ///< scatterings; left out: no roulette
+  Real roulette_floor = 0.05;
+  std::optional<int> most_scatterings{};  ///< left out: all light
+  bool general = false;                   ///< the kernel of all effects instead of the scene's own
+
+  bool operator==(const TransportSpec&) const = default;
 };
 
 /// What is done to every single sample (and to the reference) before it enters the statistics.
@@ -79,6 +108,7 @@ struct Cell {
   std::size_t medium = 0, majorant = 0, rays = 0;
   Quantity quantity = Quantity::transmittance;
   Measurement measurement;
+  TransportSpec transport;
   std::uint64_t samples_per_ray = 1;
   std::optional<Real> equal_lookups{};  ///< lookups per ray: samples_per_ray becomes this over the expected lookups per sample
   std::uint64_t seed = 1;

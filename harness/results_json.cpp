@@ -11,6 +11,7 @@
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 #include "harness/spec_json.h"
+#include "harness/transport_json.h"
 #include "harness/verdict_json.h"
 
 namespace nullmark {
@@ -55,6 +56,8 @@ Json typed(const MediumSpec& medium) {
   Json json = {{"type", medium.field.type}, {"params", parameters_json(medium.field.values)}, {"label", medium.label}};
   if (!medium.spectrum.empty()) json["spectrum"] = medium.spectrum;
   for (const MediumSpec& channel : medium.per_channel) json["media"].push_back(typed(channel));
+  add_matter(json, medium);
+  if (!medium.emission_field.empty()) json["emission"]["field"] = typed(medium.emission_field[0]);
   if (medium.optional) json["optional"] = true;
   return json;
 }
@@ -169,6 +172,12 @@ MediumSpec read_medium(const Place& place) {
     for (const Place& factor : place["spectrum"].elements()) medium.spectrum.push_back(factor.number());
   if (place.has("media"))
     for (const Place& channel : place["media"].elements()) medium.per_channel.push_back(read_medium(channel));
+  if (place.has("albedo")) medium.albedo = read_per_channel(place["albedo"], 1);
+  if (place.has("anisotropy")) medium.anisotropy = place["anisotropy"].number();
+  if (place.has("emission")) {
+    medium.emission = read_per_channel(place["emission"]["radiance"], kInfinity);
+    if (place["emission"].has("field")) medium.emission_field.push_back(read_medium(place["emission"]["field"]));
+  }
   if (place.has("optional")) medium.optional = place["optional"].boolean();
   return medium;
 }
@@ -252,6 +261,7 @@ Json cell_json(const CellRecord& record) {
                {"ray_set", typed(record.ray_set)},
                {"quantity", to_string(cell.quantity)},
                {"measurement", measurement_json(cell.measurement)},
+               {"transport", transport_json(cell.transport)},
                {"channels", record.channels},
                {"outputs", record.outputs},
                {"effects", record.effects},
@@ -311,6 +321,7 @@ CellRecord read_cell(const Place& place) {
   cell.quantity = *quantity_named(place["quantity"].one_of(quantity_names(), "quantity"));
   cell.measurement.clamp = place["measurement"]["clamp"].boolean();
   cell.measurement.quantise_bits = static_cast<int>(place["measurement"]["quantise_bits"].integer(0, 31));
+  if (place.has("transport")) cell.transport = read_transport(place["transport"]);
   record.channels = static_cast<int>(place["channels"].integer(1, kMaxChannels));
   if (place.has("outputs"))
     for (const Place& output : place["outputs"].elements()) record.outputs.push_back(output.string());

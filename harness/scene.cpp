@@ -1,5 +1,6 @@
 #include "harness/scene.h"
 
+#include <fmt/format.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -74,12 +75,23 @@ void place_equally_probable(const Medium& medium, const Ray& local, std::span<Re
 
 }  // namespace
 
+Spectrum per_channel(const std::vector<Real>& values, int channels, const char* what) {
+  const auto count = static_cast<std::size_t>(channels);
+  if (values.size() > 1 && values.size() != count)
+    throw ParameterError(
+        what, fmt::format("found {} numbers; expected one, or {}, as many as the medium has channels", values.size(), channels));
+  Spectrum result = Spectrum::Zero(channels);
+  for (std::size_t c = 0; c < count && !values.empty(); ++c)
+    result[static_cast<Eigen::Index>(c)] = values[values.size() > 1 ? c : 0];
+  return result;
+}
+
 BuiltMedium build_medium(const MediumSpec& spec) {
   BuiltMedium built;
   built.medium = build_field(spec);
   const Box box = built.medium->bounds();
   built.extrema = built.medium->extrema(box);
-  built.albedo = Spectrum::Zero(built.medium->channels());
+  built.albedo = per_channel(spec.albedo, built.medium->channels(), "albedo");
   const Affine to_world = built.medium->world_to_local().inverse();
   built.world_bounds = {Vec3::Constant(kInfinity), Vec3::Constant(-kInfinity)};
   for (int corner = 0; corner < 8; ++corner) {

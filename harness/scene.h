@@ -19,6 +19,9 @@ struct BuiltMedium {
   std::uint64_t hash = 0;  ///< of the specification and of the data behind it
 };
 
+/// A value for all channels or one each, as many as there are; none: 0.  Throws ParameterError, naming `what`.
+Spectrum per_channel(const std::vector<Real>& values, int channels, const char* what);
+
 /// Builds a specification: the field, times its spectrum or one per channel.  Throws ParameterError or MissingData.
 BuiltMedium build_medium(const MediumSpec& spec);
 

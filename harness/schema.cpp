@@ -9,6 +9,7 @@
 #include "harness/record.h"
 #include "harness/results_json.h"
 #include "harness/spec_json.h"
+#include "harness/transport_json.h"
 
 namespace nullmark {
 namespace {
@@ -50,6 +51,23 @@ Json range_schema(const Range& range) {
   return json;
 }
 
+/// What any medium takes beside its type's parameters.
+void add_matter_schema(Json& properties) {
+  const Json number = {{"type", "number"}, {"minimum", 0}};
+  const Json albedo = one_or_list(Json{{"type", "number"}, {"minimum", 0}, {"maximum", 1}});
+  properties["albedo"] = described(one_or_list(albedo), "mu_s / mu, one for all channels or one each");
+  properties["anisotropy"] =
+      one_or_list(described({{"type", "number"}, {"exclusiveMinimum", -1}, {"exclusiveMaximum", 1}, {"default", 0}},
+                            "mean cosine of the Henyey-Greenstein phase function"));
+  properties["emission"] = {
+      {"anyOf",
+       {one_or_list(number),
+        closed_object({{"radiance", one_or_list(number)}, {"field", described(reference("medium"), "scales it in space")}},
+                      {"radiance"})}},
+      {"description", "radiance L_e: a ray gains mu_a L_e a length"}};
+  properties["optional"] = {{"type", "boolean"}, {"default", false}};
+}
+
 /// Every registered type of a kind, as {"type": ...} with its parameters, swept where given as lists.
 Json component_schema(ComponentKind kind) {
   Json names = Json::array(), alternatives = Json::array();
@@ -62,16 +80,15 @@ Json component_schema(ComponentKind kind) {
     }
     if (kind == ComponentKind::medium) {
       properties["spectrum"] = one_or_list(list_of({{"type", "number"}, {"minimum", 0}}, 1));
-      properties["optional"] = {{"type", "boolean"}, {"default", false}};
+      add_matter_schema(properties);
     }
     alternatives.push_back(described(closed_object(std::move(properties), {"type"}), entry.summary));
   }
-  if (kind == ComponentKind::medium)
-    alternatives.push_back(described(closed_object({{"type", {{"const", "channels"}}},
-                                                    {"media", list_of(reference("medium"), 1)},
-                                                    {"optional", {{"type", "boolean"}, {"default", false}}}},
-                                                   {"type", "media"}),
-                                     "one grey medium per channel"));
+  if (kind == ComponentKind::medium) {
+    Json properties = {{"type", {{"const", "channels"}}}, {"media", list_of(reference("medium"), 1)}};
+    add_matter_schema(properties);
+    alternatives.push_back(described(closed_object(std::move(properties), {"type", "media"}), "one grey medium per channel"));
+  }
   Json any = {{{"enum", std::move(names)}}};
   for (Json& alternative : alternatives) any.push_back(std::move(alternative));
   return {{"anyOf", std::move(any)}};
@@ -97,7 +114,8 @@ Json definitions() {
                      {"samples_per_ray", whole(1)},
                      {"equal_lookups", described(positive(), "samples_per_ray = this over the expected lookups per sample")},
                      {"seed", whole(0)},
-                     {"measurement", measurement}};
+                     {"measurement", measurement},
+                     {"transport", transport_schema()}};
   Json cell = axes, matrix = Json::object(), pattern = Json::object();
   for (const auto& [axis, schema] : axes.items()) {
     matrix[axis] = one_or_list(schema);
@@ -185,6 +203,7 @@ Json cell_schema() {
        {"seed", whole(0)},
        {"own_streams", {{"type", "boolean"}}},
        {"measurement", {{"type", "object"}, {"required", {"clamp", "quantise_bits"}}}},
+       {"transport", {{"type", "object"}}},
        {"status",
         {{"enum", {to_string(Status::ok), to_string(Status::skipped), to_string(Status::not_run), to_string(Status::error)}}}},
        {"reason", text},

@@ -4,6 +4,7 @@
 
 #include "harness/hash.h"
 #include "harness/names.h"
+#include "harness/transport_json.h"
 
 namespace nullmark {
 namespace {
@@ -25,6 +26,7 @@ Json deciding_json(const Plan& plan, const Cell& cell) {
                {"rays", component_json(plan.ray_sets[cell.rays])},
                {"quantity", to_string(cell.quantity)},
                {"measurement", measurement_json(cell.measurement)}};
+  if (cell.transport != TransportSpec{}) json["transport"] = transport_json(cell.transport);
   add_samples(json, cell);
   json["seed"] = cell.seed;
   json["own_streams"] = cell.own_streams;
@@ -49,7 +51,16 @@ Json medium_json(const MediumSpec& medium) {
   Json json = component_json(medium.field);
   if (!medium.spectrum.empty()) json["spectrum"] = medium.spectrum;
   for (const MediumSpec& channel : medium.per_channel) json["media"].push_back(medium_json(channel));
+  add_matter(json, medium);
   return json;
+}
+
+void add_matter(Json& json, const MediumSpec& medium) {
+  if (!medium.albedo.empty()) json["albedo"] = medium.albedo;
+  if (medium.anisotropy != 0) json["anisotropy"] = medium.anisotropy;
+  if (medium.emission.empty()) return;
+  json["emission"] = {{"radiance", medium.emission}};
+  if (!medium.emission_field.empty()) json["emission"]["field"] = medium_json(medium.emission_field[0]);
 }
 
 Json measurement_json(const Measurement& measurement) {

@@ -12,7 +12,7 @@ namespace nullmark {
 struct Summary {
   std::size_t pass = 0, fail = 0, expected_open = 0, unexpected_open = 0, violated = 0, errors = 0, not_run = 0, unclaimed = 0;
   std::size_t never_started = 0;  ///< interrupted, out of time, or absent from the file though the configuration has them
-  std::size_t altered = 0;  ///< verdicts in the file that its own figures do not bear out
+  std::size_t altered = 0;        ///< verdicts in the file that its own figures do not bear out
   std::vector<OrderFit> orders;
   ExitCode exit = ExitCode::ok;
 };
