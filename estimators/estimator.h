@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -53,7 +54,10 @@ struct Passage {
   std::optional<int> degree;         ///< of the extinction between knots
   Vec3 entry = Vec3::Zero();         ///< world point at `begin`
   Value albedo;                      ///< mu_s / mu, in [0, 1]; 0 where nothing scatters
-  bool draws_absorption = true;      ///< false: absorption is left to weights (E[w; collision] = mu_s T dt), since nothing emits
+  std::function<Real(Real)>
+      distance_at_depth;         ///< of grey media with closed-form depth; only for estimators with kNeedsInversion
+  Value throughput;              ///< of the path before this flight, 1 where it begins; for trackers that heed the past
+  bool draws_absorption = true;  ///< false: absorption is left to weights (E[w; collision] = mu_s T dt), since nothing emits
 
   Real length() const { return end - begin; }
   Value value(Real x) const { return uniform_value<Value>(channels, x); }
@@ -82,14 +86,16 @@ struct Passage {
 //   Event<Value> event(const Walk&, const Ray&) const       how the flight ended: answers Quantity::free_path, drives paths
 //   bool samples_events(int channels) const                 false where there is no event for so many channels; default true
 //   Value expected(const Value& tau, const Ray&) const      a target other than exp(-tau), e.g. a factor of T
-//   bool flies_once(int channels) const                     false where a sample is several flights; default true
+//   bool flies_once(int channels) const                     false where a sample is several flights or collides without a
+//                                                           lookup; default true
 //   int real_collisions(const Walk&, const Ray&) const      tentative collisions that ended a walk; default 0
 //   Theory theory(const Ray&, const RayProfile&, int channel, Quantity) const
 //   CountLaw count_law(const Ray&, const RayProfile&, int channel) const
 //                                                           of a product of independent weights
 //   static constexpr bool kIgnoresMajorant                  lookups are no tentative collisions: not audited
 //   static constexpr bool kOwnFlights                       draws its flights by a law of its own
-//   static constexpr bool kNeedsOpticalDepth, kNeedsKnots   asks the harness to fill exact_depth, knots
+//   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion
+//                                                           asks the harness to fill exact_depth, knots, distance_at_depth
 //
 // The loop, the counting, the majorant audit and the random streams are the harness's.
 

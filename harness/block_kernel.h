@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "harness/kernel.h"
+#include "media/inversion.h"
 #include "media/logarithm.h"
 
 namespace nullmark {
@@ -92,7 +93,10 @@ class BlockKernel final : public Kernel {
     ray.knots.assign(context.knots.begin(), context.knots.end());
     ray.degree = medium.polynomial_degree();
     ray.entry = context.world.at(context.world.begin);
+    if constexpr (requires { E::kNeedsInversion; })
+      ray.distance_at_depth = [&medium, local = context.local](Real depth) { return distance_at_depth(medium, local, depth); };
     ray.albedo = context.albedo.size() > 0 ? load<Value>(context.albedo.data(), channels_) : ray.value(0);
+    ray.throughput = ray.value(1);
     if constexpr (requires { estimator_.prepare(ray); }) estimator_.prepare(ray);
   }
 

@@ -52,6 +52,11 @@ class Spectral final : public Medium {
     return scaled((*grey)[0]);
   }
 
+  std::optional<Real> distance_at_depth(const Ray& ray, Real depth) const override {
+    if (channels() > 1) return std::nullopt;
+    return spectrum_[0] > 0 ? grey_->distance_at_depth(ray, depth / spectrum_[0]) : kInfinity;
+  }
+
  private:
   // An unbounded maximum times a factor 0 is 0, not NaN.
   Spectrum scaled(Real grey) const { return (spectrum_ == 0).select(Spectrum::Zero(spectrum_.size()), spectrum_ * grey); }

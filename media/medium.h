@@ -65,6 +65,10 @@ class Medium {
 
   /// Optical depth of the local ray over [begin, end] in closed form, per channel; nothing where there is none.
   virtual std::optional<Spectrum> optical_depth(const Ray& /*ray*/) const { return std::nullopt; }
+
+  /// Its inverse on a grey medium: the distance t at which the depth from begin is `depth`, infinite where the ray is not that
+  /// deep; nothing where there is no closed form.
+  virtual std::optional<Real> distance_at_depth(const Ray& /*ray*/, Real /*depth*/) const { return std::nullopt; }
 };
 
 }  // namespace nullmark
