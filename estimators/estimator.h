@@ -57,6 +57,7 @@ struct Passage {
   std::function<Real(Real)>
       distance_at_depth;         ///< of grey media with closed-form depth; only for estimators with kNeedsInversion
   Value throughput;              ///< of the path before this flight, 1 where it begins; for trackers that heed the past
+  std::vector<Spectrum> shares;  ///< per segment: bounds of a sum's components over their sum; only with kNeedsShares
   bool draws_absorption = true;  ///< false: absorption is left to weights (E[w; collision] = mu_s T dt), since nothing emits
 
   Real length() const { return end - begin; }
@@ -94,8 +95,12 @@ struct Passage {
 //                                                           of a product of independent weights
 //   static constexpr bool kIgnoresMajorant                  lookups are no tentative collisions: not audited
 //   static constexpr bool kOwnFlights                       draws its flights by a law of its own
-//   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion
-//                                                           asks the harness to fill exact_depth, knots, distance_at_depth
+//   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
+//                                                           asks the harness to fill exact_depth, knots, distance_at_depth,
+//                                                           shares
+//   int component(const Walk&) const                        with kNeedsShares: the one component i of a sum that is looked up at
+//                                                           a collision; `extinction` is then mu_i over its share, whose mean
+//                                                           over the shares is mu
 //
 // The loop, the counting, the majorant audit and the random streams are the harness's.
 

@@ -42,6 +42,10 @@ class HandWalked {
     std::sort(ray.knots.begin(), ray.knots.end());
     ray.degree = medium_->polynomial_degree();
     ray.distance_at_depth = [this](Real depth) { return distance_at_depth(*medium_, line_, depth); };
+    for (const Segment& segment : ray.bounds.segments) {
+      const Spectrum bounds = medium_->component_maxima({line_.at(segment.begin), line_.at(segment.end)});
+      ray.shares.push_back(bounds / bounds.sum());
+    }
     ray.albedo = ray.value(0);
     ray.throughput = ray.value(1);
     prepare();
@@ -61,7 +65,7 @@ class HandWalked {
     estimator.init(walk, ray, flight, rng);
     Outcome outcome;
     for (; estimator.propose(walk, ray, flight, rng); ++outcome.lookups)
-      estimator.consume(walk, ray, flight, extinction(flight.position()), rng);
+      estimator.consume(walk, ray, flight, looked_up(walk, flight), rng);
     outcome.result = estimator.result(walk, ray);
     if constexpr (requires { estimator.event(walk, ray); }) outcome.event = estimator.event(walk, ray);
     return outcome;
@@ -105,6 +109,15 @@ class HandWalked {
   Passage ray;
 
  private:
+  Value looked_up(const typename E::Walk& walk, const Flight& at) const {
+    if constexpr (requires { estimator.component(walk); }) {
+      const int i = estimator.component(walk);
+      return medium_->component_extinction(i, line_.at(at.position())) / ray.shares[at.piece()][i];
+    } else {
+      return extinction(at.position());
+    }
+  }
+
   std::shared_ptr<const Medium> medium_;
   Ray line_;
 };

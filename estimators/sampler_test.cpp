@@ -12,7 +12,10 @@
 #include "estimators/hand_walked.h"
 #include "estimators/hero_wavelength.h"
 #include "estimators/marching_inversion.h"
+#include "estimators/multi_volume.h"
 #include "estimators/null_collision.h"
+#include "estimators/planted/decomposition_reset.h"
+#include "estimators/planted/weighted.h"
 #include "estimators/regular_inversion.h"
 #include "estimators/spectral.h"
 #include "estimators/weighted_decomposition.h"
@@ -24,6 +27,7 @@
 #include "media/layers.h"
 #include "media/linear.h"
 #include "media/polynomial.h"
+#include "media/sum.h"
 
 namespace nullmark {
 namespace {
@@ -251,6 +255,33 @@ TEST(Sampler, ClosedFormInversionIsExact) {
   EXPECT_EQ(HandWalked<ClosedForm>({}, constant(0), 1).walk(1).event.kind, EventKind::escape);
 }
 
+/// Components with boxes of their own, so that their shares change from segment to segment.
+TEST(Sampler, MultiVolumeLooksOneComponentUpAndKeepsTheLaw) {
+  Homogeneous slab;
+  slab.value = 2;
+  slab.lo = Vec3(0.4, 0, 0);
+  slab.hi = Vec3(0.7, 1, 1);
+  const auto sum = std::make_shared<Sum>(
+      std::vector<std::shared_ptr<const Medium>>{linear(0.3, 1), rising_exponential(1, -2), built(slab), constant(0)});
+  const HandWalked<DeltaTracking> delta({}, sum, 1, 1.5, 4);
+  for (const int pieces : {1, 4}) {
+    const HandWalked<MultiVolumeTracking> walked({}, sum, 1, 1.5, pieces);
+    for (const Real t : {0.1, 0.5, 0.9}) {
+      Real each = 0;
+      const Vec3 p(t, 0.5, 0.5);
+      for (int i = 0; i < sum->components(); ++i) each += sum->component_extinction(i, p);
+      EXPECT_NEAR(each, walked.extinction(t), 1e-14);
+      const Real h = 1e-6;
+      EXPECT_NEAR(std::log(walked.transmittance(t - h) / walked.transmittance(t + h)) / (2 * h), each, 1e-8);
+    }
+    expect_law(walked);
+    expect_theory(walked);
+  }
+  EXPECT_EQ(*delta.theory().lookups, *HandWalked<MultiVolumeTracking>({}, sum, 1, 1.5, 4).theory().lookups);
+  const Extrema two = {Spectrum::Ones(2), Spectrum::Ones(2), Spectrum::Ones(2)};
+  EXPECT_THROW(MultiVolumeTracking<Real>{}.check(two), ParameterError);
+}
+
 /// The distance's error against exact inversion falls with the order of the march's depth.
 TEST(Sampler, MarchingInversionConverges) {
   for (const auto& [offset, order] : {std::pair{"left", 1}, {"midpoint", 2}, {"right", 1}}) {
@@ -384,6 +415,44 @@ TEST(Decomposition, WeightsAtTheFirstCollisionHaveTheStatedVariance) {
     EXPECT_NEAR(weight.mean(), 1, kSigmas * weight.error() + 1e-12);
     EXPECT_NEAR(square.mean() - 1, row.variance, kSigmas * square.error() + 1e-5);
   }
+}
+
+/// The printed listing sets the residual's path to 0 at each null collision: the control wins too often, and the law is another.
+TEST(Decomposition, AResidualPathThatStartsAnewHasAnotherLaw) {
+  constexpr Real kLength = 30;
+  const HandWalked<AnalogDecompositionTracking> right({}, two_plus_cosine(kLength), kLength);
+  const HandWalked<PlantedDecompositionReset> reset({}, two_plus_cosine(kLength), kLength);
+  std::array<Estimate, 2> path, beyond, lookups;
+  for (std::uint64_t i = 0; i < 400000; ++i)
+    for (const std::size_t k : {0u, 1u}) {
+      const auto add = [&](const auto& outcome) {
+        path[k].add(outcome.event.distance);
+        beyond[k].add(outcome.event.distance > 0.5);
+        lookups[k].add(outcome.lookups);
+      };
+      k == 0 ? add(right.walk(i)) : add(reset.walk(i));
+    }
+  EXPECT_NEAR(path[0].mean(), .480029, kSigmas * path[0].error());
+  EXPECT_NEAR(beyond[0].mean(), std::exp(-1.), kSigmas * beyond[0].error());
+  EXPECT_NEAR(lookups[0].mean(), .960058, kSigmas * lookups[0].error());
+  EXPECT_NEAR(path[1].mean(), .318, .002);
+  EXPECT_NEAR(beyond[1].mean(), .222, .004);
+  EXPECT_NEAR(lookups[1].mean(), 1.052, .008);
+  EXPECT_GT((path[0].mean() - path[1].mean()) / path[1].error(), 100);
+}
+
+/// Collisions of the printed weighted delta tracking lack 1/P: E[w; collision] = int (mu/s) mu T, here with s = mub = 2 mu.
+TEST(Sampler, CollisionsThatAreNotDividedByTheirProbabilityAreTooLight) {
+  const HandWalked<PlantedCollisionWeight> walked({}, constant(1), 1, 2);
+  Estimate collision, escape;
+  for (std::uint64_t i = 0; i < 100000; ++i) {
+    const auto outcome = walked.walk(i);
+    collision.add(is_collision(outcome.event.kind) ? outcome.event.weight : 0);
+    escape.add(outcome.result);
+  }
+  EXPECT_NEAR(escape.mean(), std::exp(-1.), kSigmas * escape.error());
+  EXPECT_NEAR(collision.mean(), -std::expm1(-1.) / 2, kSigmas * collision.error());
+  EXPECT_LT(collision.mean(), -std::expm1(-1.) - 50 * collision.error());
 }
 
 TEST(Decomposition, RefusesWhatItCannotBound) {

@@ -67,11 +67,12 @@ Json component_schema(ComponentKind kind) {
     alternatives.push_back(described(closed_object(std::move(properties), {"type"}), entry.summary));
   }
   if (kind == ComponentKind::medium)
-    alternatives.push_back(described(closed_object({{"type", {{"const", "channels"}}},
-                                                    {"media", list_of(reference("medium"), 1)},
-                                                    {"optional", {{"type", "boolean"}, {"default", false}}}},
-                                                   {"type", "media"}),
-                                     "one grey medium per channel"));
+    for (const auto& [type, text] : {std::pair{"channels", "one grey medium per channel"}, {"sum", "the sum of grey media"}})
+      alternatives.push_back(described(closed_object({{"type", {{"const", type}}},
+                                                      {"media", list_of(reference("medium"), 1)},
+                                                      {"optional", {{"type", "boolean"}, {"default", false}}}},
+                                                     {"type", "media"}),
+                                       text));
   Json any = {{{"enum", std::move(names)}}};
   for (Json& alternative : alternatives) any.push_back(std::move(alternative));
   return {{"anyOf", std::move(any)}};

@@ -97,6 +97,16 @@ class PerChannel final : public Medium {
     }
   }
 
+  /// One channel at a point.
+  Real extinction(int channel, const Vec3& point) const {
+    const auto c = static_cast<std::size_t>(channel);
+    const Vec3 p = point.cwiseMax(bounds_.lo).cwiseMin(bounds_.hi);
+    if ((p.array() < boxes_[c].lo.array()).any() || (p.array() > boxes_[c].hi.array()).any()) return 0;
+    Real out = 0;
+    components_[c]->extinction({&p.x(), &p.y(), &p.z(), 1}, &out);
+    return out;
+  }
+
   Extrema extrema(const Box& box) const override {
     const auto n = static_cast<Eigen::Index>(components_.size());
     Extrema all = {Spectrum::Zero(n), Spectrum::Zero(n), Spectrum::Zero(n)};
