@@ -4,7 +4,8 @@
 
 namespace nullmark {
 
-/// T = exp(-tau) from the medium's closed form; no lookup, no random number.
+/// T = exp(-tau) from the medium's closed form, without a lookup; free paths of grey media by inversion: where tau(t) is a unit
+/// exponential, or escape if it is not reached [closed-form tracking].
 template <class Value>
 struct ClosedForm {
   static constexpr const char* kName = "closed_form";
@@ -14,17 +15,28 @@ struct ClosedForm {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kIgnoresMajorant = true;
   static constexpr bool kNeedsOpticalDepth = true;
+  static constexpr bool kNeedsInversion = true;
 
   Claim claim(Quantity) const { return Claim::exact; }
 
-  struct Walk {};
+  struct Walk {
+    Real depth = 0;  ///< optical depth of the collision
+  };
 
-  void init(Walk&, const Passage<Value>&, Flight&, auto&) const {}
+  void init(Walk& walk, const Passage<Value>&, Flight&, auto& rng) const { walk.depth = rng.exponential(); }
   bool propose(Walk&, const Passage<Value>&, Flight&, auto&) const { return false; }
   void consume(Walk&, const Passage<Value>&, const Flight&, const Value&, auto&) const {}
 
   Value result(const Walk&, const Passage<Value>& ray) const { return exponential(Value(-*ray.exact_depth)); }
   Value optical_depth(const Walk&, const Passage<Value>& ray) const { return *ray.exact_depth; }
+
+  bool samples_events(int channels) const { return channels == 1; }
+
+  Event<Value> event(const Walk& walk, const Passage<Value>& ray) const {
+    const Real distance = ray.distance_at_depth(walk.depth);
+    if (distance < ray.end) return {EventKind::collision, distance, ray.value(1)};
+    return {EventKind::escape, ray.end, ray.value(1)};
+  }
 
   Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const {
     return {.variance = 0, .lookups = 0, .lookups_variance = 0};

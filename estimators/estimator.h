@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -55,7 +56,11 @@ struct Passage {
   std::optional<int> degree;         ///< of the extinction between knots
   Vec3 entry = Vec3::Zero();         ///< world point at `begin`
   Value albedo;                      ///< mu_s / mu, in [0, 1]; 0 where nothing scatters
-  bool draws_absorption = true;      ///< false: absorption is left to weights (E[w; collision] = mu_s T dt), since nothing emits
+  std::function<Real(Real)>
+      distance_at_depth;         ///< of grey media with closed-form depth; only for estimators with kNeedsInversion
+  Value throughput;              ///< of the path before this flight, 1 where it begins; for trackers that heed the past
+  std::vector<Spectrum> shares;  ///< per segment: bounds of a sum's components over their sum; only with kNeedsShares
+  bool draws_absorption = true;  ///< false: absorption is left to weights (E[w; collision] = mu_s T dt), since nothing emits
 
   Real length() const { return end - begin; }
   Value value(Real x) const { return uniform_value<Value>(channels, x); }
@@ -89,14 +94,20 @@ struct Passage {
 //                                                           estimate of T(begin, distance) by a walk that has met no collision
 //                                                           since `distance`: answers Quantity::transmittance_profile
 //   Value expected(const Value& tau, const Ray&) const      a target other than exp(-tau), e.g. a factor of T
-//   bool flies_once(int channels) const                     false where a sample is several flights; default true
+//   bool flies_once(int channels) const                     false where a sample is several flights or collides without a
+//                                                           lookup; default true
 //   int real_collisions(const Walk&, const Ray&) const      tentative collisions that ended a walk; default 0
 //   Theory theory(const Ray&, const RayProfile&, int channel, Quantity) const
 //   CountLaw count_law(const Ray&, const RayProfile&, int channel) const
 //                                                           of a product of independent weights
 //   static constexpr bool kIgnoresMajorant                  lookups are no tentative collisions: not audited
 //   static constexpr bool kOwnFlights                       draws its flights by a law of its own
-//   static constexpr bool kNeedsOpticalDepth, kNeedsKnots   asks the harness to fill exact_depth, knots
+//   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
+//                                                           asks the harness to fill exact_depth, knots, distance_at_depth,
+//                                                           shares
+//   int component(const Walk&) const                        with kNeedsShares: the one component i of a sum that is looked up at
+//                                                           a collision; `extinction` is then mu_i over its share, whose mean
+//                                                           over the shares is mu
 //
 // The loop, the counting, the majorant audit and the random streams are the harness's.
 

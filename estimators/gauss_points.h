@@ -17,7 +17,7 @@ struct GaussRule {
 
 /// The rule with the fewest points that is exact for a polynomial of the degree (up to kMostDegree): degree/2 + 1, so 1 up to
 /// linear and 2 up to cubic.
-inline constexpr int kMostDegree = 79;
+inline constexpr int kMostDegree = 159;
 
 inline const GaussRule& gauss_rule(int degree) {
   static const auto rules = [] {

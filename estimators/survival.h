@@ -47,24 +47,38 @@ std::optional<std::vector<Real>> survival(const RayProfile& profile, F&& f) {
   return sum;
 }
 
-/// Moments of the lookups N of a walk that collides at `rate` and dies at `extinction` <= rate: E N = int rate P(alive), and for
-/// one channel, with kappa the running integral of what kills and M that of the rate, E N(N-1) = 2 int rate e^{-kappa} (M -
-/// kappa).
+/// Moments of the lookups N of a walk, from three functions at the nodes of the profile: the rate at which it looks up while it
+/// is alive, the part of it that leaves it alive, and its chance to be alive: E N = int rate alive, E N(N-1) = 2 int rate(y)
+/// alive(y) int_0^y through dx dy.
+inline void state_lookups(Theory& theory, const RayProfile& profile, const std::vector<Real>& rate,
+                          const std::vector<Real>& through, const std::vector<Real>& alive) {
+  const auto integral = [&](const std::vector<Real>& values) {
+    std::size_t j = 0;
+    return profile.integrate(0, [&](const RayProfile::Node&) { return values[j++]; });
+  };
+  const std::vector<Real> before = profile.running(through);
+  std::vector<Real> first(rate.size()), pairs(rate.size());
+  for (std::size_t i = 0; i < rate.size(); ++i) {
+    first[i] = rate[i] * alive[i];
+    pairs[i] = 2 * first[i] * before[i];
+  }
+  const Real mean = integral(first);
+  theory.lookups = mean;
+  theory.lookups_variance = std::max<Real>(0, integral(pairs) + mean - mean * mean);
+}
+
+/// The same for a walk that collides at `rate` and dies at `extinction` <= rate; the mean alone where channels share it.
 template <class F, class R>
 void state_lookups_until_killed(Theory& theory, const RayProfile& profile, F&& extinction, R&& rate) {
   const auto alive = survival(profile, extinction);
   if (!alive) return;
-  std::size_t j = 0;
-  const Real mean = profile.integrate(0, [&](const RayProfile::Node& at) { return rate(at) * (*alive)[j++]; });
-  theory.lookups = mean;
-  if (profile.channels() > 1) return;
-  const auto survived = profile.running(0, [&](const RayProfile::Node& at) { return rate(at) - extinction(0, at); });
-  j = 0;
-  const Real pairs = profile.integrate(0, [&](const RayProfile::Node& at) {
-    const std::size_t i = j++;
-    return 2 * rate(at) * (*alive)[i] * survived[i];
-  });
-  theory.lookups_variance = std::max<Real>(0, pairs + mean - mean * mean);
+  std::vector<Real> rates, through;
+  for (const RayProfile::Node& at : profile.nodes(0)) {
+    rates.push_back(rate(at));
+    through.push_back(rate(at) - extinction(0, at));
+  }
+  state_lookups(theory, profile, rates, through, *alive);
+  if (profile.channels() > 1) theory.lookups_variance.reset();
 }
 
 }  // namespace nullmark

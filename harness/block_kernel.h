@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "harness/kernel.h"
+#include "media/inversion.h"
 #include "media/logarithm.h"
 
 namespace nullmark {
@@ -108,7 +109,19 @@ class BlockKernel final : public Kernel {
     ray.knots.assign(context.knots.begin(), context.knots.end());
     ray.degree = medium.polynomial_degree();
     ray.entry = context.world.at(context.world.begin);
+    if constexpr (requires { E::kNeedsInversion; })
+      ray.distance_at_depth = [&medium, local = context.local](Real depth) { return distance_at_depth(medium, local, depth); };
+    if constexpr (requires { E::kNeedsShares; }) {
+      ray.shares.clear();
+      for (const Segment& segment : ray.bounds.segments) {
+        const Vec3 a = context.local.at(segment.begin), b = context.local.at(segment.end);
+        Spectrum bounds = medium.component_maxima({a.cwiseMin(b), a.cwiseMax(b)});
+        if (!(bounds.sum() > 0)) bounds.setOnes();
+        ray.shares.push_back(bounds / bounds.sum());
+      }
+    }
     ray.albedo = context.albedo.size() > 0 ? load<Value>(context.albedo.data(), channels_) : ray.value(0);
+    ray.throughput = ray.value(1);
     if constexpr (requires { estimator_.prepare(ray); }) estimator_.prepare(ray);
   }
 
@@ -228,7 +241,7 @@ class BlockKernel final : public Kernel {
       }
       active = kept;
       if (active == 0) break;
-      medium.extinction({state.x.data(), state.y.data(), state.z.data(), active}, state.extinction.data());
+      look_up(state, medium, active);
       for (std::size_t a = 0; a < active; ++a) {
         const std::uint32_t k = state.active[a];
         const Value extinction = load<Value>(&state.extinction[a * channels], channels_);
@@ -246,6 +259,19 @@ class BlockKernel final : public Kernel {
           active = 0;
         }
       }
+    }
+  }
+
+  void look_up(State& state, const Medium& medium, std::size_t active) const {
+    if constexpr (requires { E::kNeedsShares; }) {
+      for (std::size_t a = 0; a < active; ++a) {
+        const std::uint32_t k = state.active[a];
+        const int component = estimator_.component(state.walk[k]);
+        state.extinction[a] = medium.component_extinction(component, {state.x[a], state.y[a], state.z[a]}) /
+                              state.ray.shares[state.flight[k].piece()][component];
+      }
+    } else {
+      medium.extinction({state.x.data(), state.y.data(), state.z.data(), active}, state.extinction.data());
     }
   }
 

@@ -10,7 +10,10 @@
 namespace nullmark {
 namespace {
 
-constexpr const char* kChannels = "channels";
+/// Media made of media: one channel of each, or their sum.
+constexpr const char *kChannels = "channels", *kSum = "sum";
+
+bool is_composed(const std::string& type) { return type == kChannels || type == kSum; }
 
 std::string expectation(const Range& range, const std::string& unit) {
   std::string text = "a finite number";
@@ -89,7 +92,7 @@ std::vector<std::string> names_of(const std::vector<ComponentInfo>& entries) {
 /// The entry's type, checked, and the place to blame for it.
 std::string read_type(ComponentKind kind, const Place& place) {
   std::vector<std::string> names = names_of(registered(kind));
-  if (kind == ComponentKind::medium) names.push_back(kChannels);
+  if (kind == ComponentKind::medium) names.insert(names.end(), {kChannels, kSum});
   if (!place.json().is_string() && !place.json().is_object())
     place.expected(fmt::format("the name of a {} or an object with \"type\"", to_string(kind)));
   const Place type = place.json().is_string() ? place : place["type"];
@@ -157,7 +160,7 @@ void complete(MediumSpec& medium) {
   }
   for (MediumSpec& channel : medium.per_channel) {
     complete(channel);
-    medium.label += (medium.label.empty() ? "channels(" : "|") + channel.label;
+    medium.label += (medium.label.empty() ? medium.field.type + "(" : "|") + channel.label;
     medium.optional |= channel.optional;
   }
   medium.label += ")";
@@ -208,20 +211,20 @@ std::vector<MediumSpec> read_given_media(const Place& place) {
   if (place.json().is_object() && place.has("optional")) first.optional = place["optional"].boolean();
   std::vector<MediumSpec> media = {first};
 
-  if (read_type(ComponentKind::medium, place) == kChannels) {
+  if (const std::string type = read_type(ComponentKind::medium, place); is_composed(type)) {
     if (!place.json().is_object()) place.expected("an object with \"type\" and \"media\"");
     std::vector<std::string> keys = kMatterKeys;
     keys.insert(keys.end(), {"type", "media"});
     place.expect_keys(keys);
     const std::vector<Place> channels = place["media"].elements();
     if (channels.empty() || channels.size() > kMaxChannels)
-      place["media"].expected(fmt::format("1 to {} media, one per channel", kMaxChannels));
-    media[0].field.type = kChannels;
+      place["media"].expected(fmt::format("1 to {} grey media", kMaxChannels));
+    media[0].field.type = type;
     media[0].field.pointer = place.where();
     for (const Place& channel : channels) {
       const std::vector<MediumSpec> variants = read_given_media(channel);
       if (!variants[0].spectrum.empty() || !variants[0].per_channel.empty())
-        channel.fail("a channel's medium must be grey; expected neither \"spectrum\" nor \"channels\" inside \"channels\"");
+        channel.fail(fmt::format("its medium must be grey; expected neither \"spectrum\" nor \"{0}\" inside \"{0}\"", type));
       media =
           crossed(media, variants, [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
     }

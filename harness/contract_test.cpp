@@ -12,11 +12,18 @@
 namespace nullmark {
 namespace {
 
-/// All estimators that claim to be exact or unbiased for transmittance by default, as a JSON list; planted bugs do not count.
-std::string honest_estimators() {
+/// All estimators that claim to be exact or unbiased for transmittance by default and take media of so many channels, as a JSON
+/// list; planted bugs do not count.
+std::string honest_estimators(int channels = 1) {
+  const Extrema medium = {Spectrum::Zero(channels), Spectrum::Ones(channels), Spectrum::Ones(channels)};
   std::string list;
   for (const EstimatorEntry& entry : Registry<EstimatorEntry>::instance().entries()) {
     if (entry.planted) continue;
+    try {
+      entry.make()->check(medium);
+    } catch (const ParameterError&) {
+      continue;
+    }
     const Claim claim = entry.make()->claim(Quantity::transmittance);
     if (claim == Claim::exact || claim == Claim::unbiased) list += fmt::format("{}\"{}\"", list.empty() ? "" : ",", entry.name);
   }
@@ -88,7 +95,7 @@ TEST(Contract, ChromaticMediaAreMetChannelByChannel) {
                                                            {{"type":"gaussian_bump","optical_depth":0.4}},{{"type":"homogeneous","extinction":0.3}}]}},
                               {{"type":"homogeneous","extinction":0.4,"spectrum":[0,1,2,3,1,1,1,1,1,1,1,1,1,1,0.5,2]}}],
                     "majorant":["global",{{"type":"grid","resolution":4}}]}})",
-      honest_estimators()));
+      honest_estimators(3)));
   EXPECT_GT(agreeing(records), 40);
   for (const CellRecord& record : records)
     if (record.status == Status::ok) {
@@ -190,7 +197,8 @@ TEST(Contract, ViolatedMajorantsAreCounted) {
       honest_estimators()));
   int audited = 0;
   for (const CellRecord& record : records) {
-    if (record.cell.estimator.type == "closed_form" || record.cell.estimator.type == "regular") continue;
+    const std::string& type = record.cell.estimator.type;
+    if (type == "closed_form" || type == "regular" || type == "regular_inversion") continue;
     EXPECT_GT(record.majorant_violations, 0u) << record.cell.name;
     EXPECT_NEAR(*record.largest_violation, 1 / 0.9, 1e-2) << record.cell.name;
     ++audited;

@@ -12,6 +12,7 @@
 #include "harness/hash.h"
 #include "harness/parameter_values.h"
 #include "media/channels.h"
+#include "media/sum.h"
 
 namespace nullmark {
 namespace {
@@ -20,6 +21,7 @@ std::shared_ptr<const Medium> build_field(const MediumSpec& spec) {
   if (!spec.per_channel.empty()) {
     std::vector<std::shared_ptr<const Medium>> fields;
     for (const MediumSpec& channel : spec.per_channel) fields.push_back(build_field(channel));
+    if (spec.field.type == "sum") return std::make_shared<Sum>(std::move(fields));
     return std::make_shared<PerChannel>(std::move(fields));
   }
   std::shared_ptr<const Medium> field = make_medium(spec.field)->build();

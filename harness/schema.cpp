@@ -84,11 +84,12 @@ Json component_schema(ComponentKind kind) {
     }
     alternatives.push_back(described(closed_object(std::move(properties), {"type"}), entry.summary));
   }
-  if (kind == ComponentKind::medium) {
-    Json properties = {{"type", {{"const", "channels"}}}, {"media", list_of(reference("medium"), 1)}};
-    add_matter_schema(properties);
-    alternatives.push_back(described(closed_object(std::move(properties), {"type", "media"}), "one grey medium per channel"));
-  }
+  if (kind == ComponentKind::medium)
+    for (const auto& [type, text] : {std::pair{"channels", "one grey medium per channel"}, {"sum", "the sum of grey media"}}) {
+      Json properties = {{"type", {{"const", type}}}, {"media", list_of(reference("medium"), 1)}};
+      add_matter_schema(properties);
+      alternatives.push_back(described(closed_object(std::move(properties), {"type", "media"}), text));
+    }
   Json any = {{{"enum", std::move(names)}}};
   for (Json& alternative : alternatives) any.push_back(std::move(alternative));
   return {{"anyOf", std::move(any)}};

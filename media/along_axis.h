@@ -25,8 +25,10 @@ inline std::pair<Real, Real> outward(std::pair<Real, Real> bounds) {
 /// `Profile` has `Real value(Real s)` = f(s) >= 0, `Real integral(Real a, Real b)` = int_a^b f ds for a < b in closed form and
 /// relatively accurate however close a and b are, `std::pair<Real, Real> extrema(Real a, Real b)`, and where they exist `void
 /// values(Real* s, std::size_t n)` (in place, for a block), `void
-/// knots(std::vector<Real>& s)`, `int polynomial_degree()`, `prepare()`. With `optical_depth` tau > 0, scale = tau / (int_0^1 f
-/// ds * (hi - lo)): the axis then has the transmittance e^-tau whatever the profile's own amplitude; otherwise scale = 1.
+/// knots(std::vector<Real>& s)`, `int polynomial_degree()`, `prepare()`, `Real fraction_at(Real a, Real b, Real mean)`: the x of
+/// int_0^x f(a + (b - a) y) dy = mean, for b on either side of a, where it is below 1. With `optical_depth` tau > 0, scale = tau
+/// / (int_0^1 f ds * (hi - lo)): the axis then has the transmittance e^-tau whatever the profile's own amplitude; otherwise scale
+/// = 1.
 template <class Profile>
 struct AlongAxis {
   static constexpr const char* kName = Profile::kName;
@@ -109,6 +111,16 @@ struct AlongAxis {
     const Real a = coordinate(ray.at(ray.begin)[axis]), b = coordinate(ray.at(ray.end)[axis]);
     const Real mean = a == b ? profile.value(a) : profile.integral(std::min(a, b), std::max(a, b)) / std::abs(b - a);
     return scale * mean * ray.length();
+  }
+
+  std::optional<Real> distance_at_depth(const Ray& ray, Real depth) const requires requires(const Profile& p, Real x) {
+    p.fraction_at(x, x, x);
+  }
+  {
+    if (!(depth < *optical_depth(ray))) return kInfinity;
+    const Real a = coordinate(ray.at(ray.begin)[axis]), b = coordinate(ray.at(ray.end)[axis]);
+    const Real fraction = profile.fraction_at(a, b, depth / (scale * ray.length()));
+    return std::min(ray.end, ray.begin + fraction * ray.length());
   }
 
  private:

@@ -52,6 +52,11 @@ class Spectral final : public Medium {
     return scaled((*grey)[0]);
   }
 
+  std::optional<Real> distance_at_depth(const Ray& ray, Real depth) const override {
+    if (channels() > 1) return std::nullopt;
+    return spectrum_[0] > 0 ? grey_->distance_at_depth(ray, depth / spectrum_[0]) : kInfinity;
+  }
+
  private:
   // An unbounded maximum times a factor 0 is 0, not NaN.
   Spectrum scaled(Real grey) const { return (spectrum_ == 0).select(Spectrum::Zero(spectrum_.size()), spectrum_ * grey); }
@@ -90,6 +95,16 @@ class PerChannel final : public Medium {
       const Points block = {points.x + begin, points.y + begin, points.z + begin, std::min(kBlock, points.size - begin)};
       for (std::size_t c = 0; c < components_.size(); ++c) look_up(c, block, out + begin * components_.size() + c);
     }
+  }
+
+  /// One channel at a point.
+  Real extinction(int channel, const Vec3& point) const {
+    const auto c = static_cast<std::size_t>(channel);
+    const Vec3 p = point.cwiseMax(bounds_.lo).cwiseMin(bounds_.hi);
+    if ((p.array() < boxes_[c].lo.array()).any() || (p.array() > boxes_[c].hi.array()).any()) return 0;
+    Real out = 0;
+    components_[c]->extinction({&p.x(), &p.y(), &p.z(), 1}, &out);
+    return out;
   }
 
   Extrema extrema(const Box& box) const override {

@@ -25,6 +25,13 @@ struct ExponentialProfile {
     return growth == 0 ? (b - a) * value(a) : (b - a) * value(a) * (std::expm1(growth) / growth);
   }
 
+  /// The root of f(a) (e^{g x} - 1)/g = mean, g = rate (b - a).
+  Real fraction_at(Real a, Real b, Real mean) const {
+    const Real growth = rate * (b - a), scaled = mean / value(a);
+    if (growth == 0) return scaled;
+    return growth * scaled > -1 ? std::log1p(growth * scaled) / growth : kInfinity;
+  }
+
   std::pair<Real, Real> extrema(Real a, Real b) const {
     const std::pair<Real, Real> ends = std::minmax({value(a), value(b)});
     return rate == 0 ? ends : outward(ends);

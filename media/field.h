@@ -27,8 +27,8 @@ inline void append_planes(const Ray& ray, int axis, Real lo, Real hi, int n, std
 
 /// A grey medium from a plain struct: the author writes `Real extinction(const Vec3&) const`, `Extrema extrema(const Box&)
 /// const`, `Box bounds() const`, and where they exist `void knots(const Ray&, std::vector<Real>&) const`, `int
-/// polynomial_degree() const`, `std::optional<Real> optical_depth(const Ray&) const`; this adaptor makes the block loop with the
-/// lookup inlined.
+/// polynomial_degree() const`, `std::optional<Real> optical_depth(const Ray&) const`, `std::optional<Real>
+/// distance_at_depth(const Ray&, Real depth) const`; this adaptor makes the block loop with the lookup inlined.
 template <class Field>
 class FieldMedium final : public Medium {
  public:
@@ -68,6 +68,13 @@ class FieldMedium final : public Medium {
         return Spectrum::Constant(1, *depth);
     }
     return std::nullopt;
+  }
+
+  std::optional<Real> distance_at_depth(const Ray& ray, Real depth) const override {
+    if constexpr (requires { field_.distance_at_depth(ray, depth); })
+      return field_.distance_at_depth(clipped(ray, field_.bounds()), depth);
+    else
+      return std::nullopt;
   }
 
  private:

@@ -29,6 +29,9 @@ struct Homogeneous {
   Extrema extrema(const Box&) const { return Extrema::grey(value, value, value); }
   int polynomial_degree() const { return 0; }
   std::optional<Real> optical_depth(const Ray& ray) const { return value * ray.length(); }
+  std::optional<Real> distance_at_depth(const Ray& ray, Real depth) const {
+    return depth < value * ray.length() ? std::min(ray.end, ray.begin + depth / value) : kInfinity;
+  }
 };
 
 }  // namespace nullmark

@@ -22,6 +22,13 @@ struct LinearProfile {
   Real integral(Real a, Real b) const { return (b - a) * value((a + b) / 2); }
   std::pair<Real, Real> extrema(Real a, Real b) const { return std::minmax({value(a), value(b)}); }
   int polynomial_degree() const { return 1; }
+
+  /// The root of f(a) x + (f(b) - f(a)) x^2/2 = mean, in the form that does not cancel.
+  Real fraction_at(Real a, Real b, Real mean) const {
+    const Real first = value(a), square = first * first + 2 * (value(b) - first) * mean;
+    if (mean == 0) return 0;
+    return square >= 0 ? 2 * mean / (first + std::sqrt(square)) : kInfinity;
+  }
 };
 
 using Linear = AlongAxis<LinearProfile>;

@@ -65,6 +65,20 @@ class Medium {
 
   /// Optical depth of the local ray over [begin, end] in closed form, per channel; nothing where there is none.
   virtual std::optional<Spectrum> optical_depth(const Ray& /*ray*/) const { return std::nullopt; }
+
+  /// Its inverse on a grey medium: the distance t at which the depth from begin is `depth`, infinite where the ray is not that
+  /// deep; nothing where there is no closed form.
+  virtual std::optional<Real> distance_at_depth(const Ray& /*ray*/, Real /*depth*/) const { return std::nullopt; }
+
+  /// Of a grey medium that is a sum: the number of its components (at most kMaxChannels), their bounds over a local box, and one
+  /// alone at a point.  Others are their only component.
+  virtual int components() const { return 1; }
+  virtual Spectrum component_maxima(const Box& box) const { return extrema(box).maximum; }
+  virtual Real component_extinction(int /*component*/, const Vec3& point) const {
+    Real out = 0;
+    extinction({&point.x(), &point.y(), &point.z(), 1}, &out);
+    return out;
+  }
 };
 
 }  // namespace nullmark

@@ -45,6 +45,11 @@ inline Real& channel(Spectrum& x, int c) { return x[c]; }
 inline int channel_count(Real) { return 1; }
 inline int channel_count(const Spectrum& x) { return static_cast<int>(x.size()); }
 
+inline Real average(Real x) { return x; }
+inline Real average(const Spectrum& x) { return x.mean(); }
+inline Real magnitude(Real x) { return std::abs(x); }
+inline Spectrum magnitude(const Spectrum& x) { return x.abs(); }
+
 inline Real exponential(Real x) { return std::exp(x); }
 inline Spectrum exponential(const Spectrum& x) { return x.exp(); }
 

@@ -36,10 +36,11 @@ struct PlantedDecompositionReset {
     Value transmittance;
     Real control_path = 0;  ///< distance along the ray
     bool done = false;
+    Real distance = 0;
   };
 
   void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
-    walk = {ray.value(1), ray.begin + rng.exponential() / ray.control, false};
+    walk = {ray.value(1), ray.begin + rng.exponential() / ray.control, false, ray.end};
   }
 
   bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
@@ -47,6 +48,7 @@ struct PlantedDecompositionReset {
     flight.start(ray.residual);
     const bool inside = flight.next(rng);
     if (walk.control_path > flight.position()) return inside;
+    walk.distance = walk.control_path;
     walk.transmittance = ray.value(0);
     return false;
   }
@@ -59,9 +61,16 @@ struct PlantedDecompositionReset {
       any = any || channel(walk.transmittance, c) > 0;
     }
     walk.done = !any;
+    if (walk.done) walk.distance = at.position();
   }
 
   Value result(const Walk& walk, const Ray&) const { return walk.transmittance; }
+
+  bool samples_events(int channels) const { return channels == 1; }
+
+  Event<Value> event(const Walk& walk, const Ray& ray) const {
+    return {walk.distance < ray.end ? EventKind::collision : EventKind::escape, walk.distance, ray.value(1)};
+  }
 
   int real_collisions(const Walk& walk, const Ray&) const { return walk.done; }
 

@@ -3,6 +3,7 @@
 #include "estimators/planted/clamped.h"
 #include "estimators/planted/constants.h"
 #include "estimators/planted/control_twice.h"
+#include "estimators/planted/decomposition.h"
 #include "estimators/planted/decomposition_reset.h"
 #include "estimators/planted/flight_rate.h"
 #include "estimators/planted/moments.h"
@@ -12,7 +13,9 @@
 #include "estimators/planted/rare_nan.h"
 #include "estimators/planted/roulette.h"
 #include "estimators/planted/segments.h"
+#include "estimators/planted/spectral.h"
 #include "estimators/planted/streams.h"
+#include "estimators/planted/weighted.h"
 #include "harness/registry.h"
 
 namespace nullmark {
@@ -26,9 +29,12 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedClampedRatio);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedClampedResidual);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedCoin);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedControlTwice);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedDecompositionMarginal);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedDecompositionReset);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedDecompositionStart);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedFirstSegment);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedFlightRate);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedHeroHistory);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedLastSegment);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedNan);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedNeighbour, WrappedSource<PlantedNeighbour>);
@@ -40,8 +46,11 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedRayStreams, WrappedSource<PlantedRayStreams
 NULLMARK_REGISTER_PLANTED_BUG(PlantedReference);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedRoulette);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedSecondLookup);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedSpectralSum);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedStaleResidual);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedStepParenthesis);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedTerminalTerm);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedWeightSign);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedWholeDepth);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedZero);
 

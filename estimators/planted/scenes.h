@@ -60,6 +60,18 @@ inline constexpr PlantedScene kPlantedScenes[] = {
     // 2 e^{-1}/(1 - e^{-2}) - 1: each turn escapes with e^{-2} or is killed with (1 - 3 e^{-2})/2
     {"planted_decomposition_reset", R"("planted_decomposition_reset")", R"({"type":"linear","begin":0.5,"end":2.5})", kBound,
      kThroughTheBox, -0.149082},
+    // e^{1/2} - 1: the residual is 0 where paths begin
+    {"planted_decomposition_start", R"("planted_decomposition_start")", kRising, kBound, kThroughTheBox, 0.648721},
+    // cosh(1/2) - 1: after a first residual collision at x the rest of the walk is killed at rate 1/2 + x
+    {"planted_stale_residual", R"("planted_stale_residual")", kRising, kBound, kThroughTheBox, 0.127626},
+    // e^{-1/6} - 1: a factor 2/3 at each null collision
+    {"planted_decomposition_marginal", R"("planted_decomposition_marginal")", kRising, kBound, kThroughTheBox, -0.153518},
+    // e^{-3/2} - 1: every other collision kills all channels
+    {"planted_spectral_sum", R"("planted_spectral_sum")", kThreeChannels, kTwice, kThroughTheBox, -0.776870},
+    // avg_h e^{4 (a_h a_0/avg a - 1)} e^{1/2} - 1, a = (7/8, 3/4, 1/2)
+    {"planted_hero_history", R"("planted_hero_history")", kThreeChannels, kTwice, kThroughTheBox, 0.288118},
+    // e^{1/5} - 1
+    {"planted_weight_sign", R"("planted_weight_sign")", kConstant, kTooLow, kThroughTheBox, 0.221403},
     // W(x) = e^{-5(1-x)} + .9 int_0^{-log .8} 5 e^{-s} W(x + s) ds
     {"planted_step_parenthesis", R"("planted_step_parenthesis")", R"({"type":"homogeneous","extinction":0.5})",
      R"({"type":"global","looseness":10})", kThroughTheBox, 0.381547},

@@ -1,0 +1,113 @@
+#pragma once
+
+#include "estimators/estimator.h"
+#include "estimators/survival.h"
+
+namespace nullmark {
+
+/// Analog decomposition tracking [Kutz et al. 2017, Sec. 4.1]: the free path is the shorter of the control's, in closed form,
+/// and the residual's, delta tracked at rate mub - mu_c; the residual's path ACCUMULATES over its null collisions.  The control
+/// is constant in each segment.  Needs mu_c <= mu <= mub and mub > mu_c, and shares that scatter alike in both.  1 where the walk
+/// escapes: Var = T (1 - T), lookups int (mub - mu_c) T(0,x) dx, which is (1 - mu_c/mub) times delta tracking's.  Grey media.
+template <class Value>
+struct AnalogDecompositionTracking {
+  static constexpr const char* kName = "analog_decomposition";
+  static constexpr const char* kSummary = "decomposition tracking: the shorter of a closed-form and a delta-tracked free path";
+  static constexpr const char* kSource = "Kutz, Habel, Li, Novak 2017, Sec. 4.1";
+  static constexpr SampleRange kRange = SampleRange::binary;
+  static constexpr bool kNeedsBound = true;
+  static constexpr bool kOwnFlights = true;
+
+  std::string control = "minimum";
+  Real factor = 1, value = 0;
+
+  void parameters(ParameterVisitor& visit) {
+    visit.choice("control", control, {"minimum", "given"}, "control extinction: factor times the segment's minimum, or given");
+    visit.number("factor", factor, Range::between(0, 1), "", "share of the segment's minimum (minimum)");
+    visit.number("value", value, Range::non_negative(), "1/length", "control extinction (given); at most the medium's minimum");
+  }
+
+  void check(const Extrema& medium) const {
+    if (medium.minimum.size() > 1)
+      throw ParameterError("type", std::string(kName) + " takes grey media only; expected one channel, found " +
+                                       std::to_string(medium.minimum.size()) +
+                                       "; \"spectral\" with control \"minimum\" decomposes chromatic media");
+    if (control == "given" && value > medium.minimum[0])
+      throw ParameterError("value", "control exceeds the medium's least extinction; " + std::string(kName) +
+                                        " needs mu_c <= mu; \"weighted_decomposition\" takes any control");
+  }
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Ray : Passage<Value> {
+    Rates control, residual;
+  };
+
+  void prepare(Ray& ray) const {
+    ray.control.start(ray.begin);
+    ray.residual.start(ray.begin);
+    for (const Segment& segment : ray.bounds.segments) {
+      const Real mu_c = control == "given" ? value : factor * segment.extinction.minimum[0];
+      ray.control.append(segment.end, mu_c);
+      ray.residual.append(segment.end, std::max<Real>(0, segment.majorant - mu_c));
+    }
+  }
+
+  struct Walk {
+    Real control_path = 0;  ///< distance of the control's collision, infinite where it has none on the ray
+    Real distance = 0;
+    bool done = false, looked_up = false;
+  };
+
+  void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+    flight.start(ray.control);
+    walk = {flight.next(rng) ? flight.position() : kInfinity, ray.end, false, false};
+    flight.start(ray.residual);
+  }
+
+  bool propose(Walk& walk, const Ray&, Flight& flight, auto& rng) const {
+    if (walk.done) return false;
+    const bool inside = flight.next(rng);
+    if (flight.position() <= walk.control_path) return inside;
+    walk.distance = walk.control_path;
+    walk.done = true;
+    return false;
+  }
+
+  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+    if (!(rng.uniform() * at.rate() < channel(extinction, 0) - ray.control.rate(at.piece()))) return;
+    walk.distance = at.position();
+    walk.done = walk.looked_up = true;
+  }
+
+  Value result(const Walk& walk, const Ray& ray) const { return ray.value(walk.done ? 0 : 1); }
+
+  bool samples_events(int channels) const { return channels == 1; }
+
+  Event<Value> event(const Walk& walk, const Ray& ray) const {
+    return {walk.done ? EventKind::collision : EventKind::escape, walk.distance, ray.value(1)};
+  }
+
+  int real_collisions(const Walk& walk, const Ray&) const { return walk.looked_up; }
+
+  /// Where the rate is violated every residual collision is accepted: the walk sees mu_c + min(mu - mu_c, mubr).
+  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+    std::vector<Real> rate, through, alive;
+    for (const RayProfile::Node& at : profile.nodes(c)) {
+      rate.push_back(ray.residual.rate(at.piece));
+      through.push_back(std::max<Real>(0, rate.back() - (at.extinction - ray.control.rate(at.piece))));
+      alive.push_back(ray.control.rate(at.piece) + rate.back() - through.back());
+    }
+    std::size_t j = 0;
+    const Real depth = profile.integrate(c, [&](const RayProfile::Node&) { return alive[j++]; });
+    Theory theory{.variance = std::exp(-depth) * -std::expm1(-depth)};
+    constexpr Real kRounding = 1e-12;
+    if (depth < profile.optical_depth(c) * (1 - kRounding)) theory.mean = std::exp(-depth);
+    alive = profile.running(alive);
+    for (Real& x : alive) x = std::exp(-x);
+    state_lookups(theory, profile, rate, through, alive);
+    return theory;
+  }
+};
+
+}  // namespace nullmark

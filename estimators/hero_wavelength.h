@@ -1,0 +1,136 @@
+#pragma once
+
+#include "estimators/estimator.h"
+#include "estimators/event_choice.h"
+
+namespace nullmark {
+
+/// Hero wavelength sampling [Wilkie et al. 2014] in the path space of null collisions [Miller, Georgiev, Jarosz 2019]: a channel
+/// drawn uniformly (on a path's later flights in proportion to its throughput, so that it is one hero's path) is delta tracked at
+/// the majorant of them all, and the balance heuristic over the channels weighs the path for each: w_l = f_l/avg_h p_h, with p_h
+/// the chance of the walk's events had h been the hero and f_l what they contribute to l. Needs mub >= mu of all channels.
+/// Weights lie in [0, number of channels] and have the law of history-aware average's [Kutz et al. 2017, Sec. 5]: lookups int mub
+/// avg_l T_l; E[X_l^2] = sum_k Poisson(M; k) a_l^2k/avg_h a_h^k on constant media, a = mu_n/mub.
+template <class Value>
+struct HeroWavelengthTracking {
+  static constexpr const char* kName = "hero_wavelength";
+  static constexpr const char* kSummary = "delta tracking of one random channel, balance heuristic over all";
+  static constexpr const char* kSource = "Wilkie et al. 2014; Miller, Georgiev, Jarosz 2019";
+  static constexpr SampleRange kRange = SampleRange::non_negative;
+  static constexpr bool kNeedsBound = true;
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Walk {
+    int hero = 0;
+    Value contribution, chance;  ///< f and p, over avg p
+    EventKind kind = EventKind::escape;
+    Real distance = 0;
+  };
+
+  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const {
+    walk = {-1, ray.value(1), ray.throughput / average(ray.throughput), EventKind::escape, ray.end};
+  }
+
+  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const {
+    return walk.kind == EventKind::escape && flight.next(rng);
+  }
+
+  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+    if (walk.hero < 0) walk.hero = choose(walk.chance, ray.channels, rng);
+    Value bounded = extinction;
+    for (int c = 0; c < ray.channels; ++c) channel(bounded, c) = std::min(channel(extinction, c), at.rate());
+    const Coefficients<Value> mu(bounded, ray.albedo, at.rate());
+    const Value absorb = ray.draws_absorption ? mu.absorb : ray.value(0);
+    const EventKind kind =
+        choose_event(rng.uniform(), channel(absorb, walk.hero), channel(mu.scatter, walk.hero), channel(mu.null, walk.hero));
+    if (kind != EventKind::escape) {
+      walk.kind = kind;
+      walk.distance = at.position();
+    }
+    for (int c = 0; c < ray.channels; ++c) {
+      const Real own = channel(kind == EventKind::absorb ? absorb : mu.of(kind), c);
+      const Real sum = channel(absorb, c) + channel(mu.scatter, c) + channel(mu.null, c);
+      channel(walk.contribution, c) *= own / at.rate();
+      channel(walk.chance, c) *= sum > 0 ? own / sum : 0;
+    }
+    const Real mean = average(walk.chance);
+    walk.contribution = mean > 0 ? Value(walk.contribution / mean) : ray.value(0);
+    walk.chance = mean > 0 ? Value(walk.chance / mean) : ray.value(0);
+  }
+
+  Value result(const Walk& walk, const Passage<Value>& ray) const {
+    return walk.kind == EventKind::escape ? walk.contribution : ray.value(0);
+  }
+
+  Event<Value> event(const Walk& walk, const Passage<Value>&) const { return {walk.kind, walk.distance, walk.contribution}; }
+
+  int real_collisions(const Walk& walk, const Passage<Value>&) const { return walk.kind != EventKind::escape; }
+
+  /// Where the majorant is violated the walk sees min(mu, mub).
+  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+    Theory theory;
+    if (!ray.draws_absorption) return theory;
+    std::vector<Real> rate, alive;
+    Real seen = 0;
+    bool constant = true;
+    for (std::size_t j = 0; j < profile.nodes(0).size(); ++j) {
+      rate.push_back(ray.majorant.rate(profile.nodes(0)[j].piece));
+      constant = constant && rate[j] == rate[0];
+    }
+    alive.assign(rate.size(), 0);
+    for (int l = 0; l < ray.channels; ++l) {
+      std::vector<Real> killed;
+      for (const RayProfile::Node& at : profile.nodes(l)) {
+        killed.push_back(std::min(at.extinction, ray.majorant.rate(at.piece)));
+        constant = constant && killed.back() == killed[0];
+      }
+      const std::vector<Real> depth = profile.running(killed);
+      for (std::size_t j = 0; j < rate.size(); ++j) alive[j] += std::exp(-depth[j]) / ray.channels;
+      std::size_t j = 0;
+      const Real whole = profile.integrate(l, [&](const RayProfile::Node&) { return killed[j++]; });
+      if (l == c) seen = whole;
+    }
+    if (seen < profile.optical_depth(c) * (1 - 1e-12)) theory.mean = std::exp(-seen);
+    for (std::size_t j = 0; j < rate.size(); ++j) alive[j] *= rate[j];
+    std::size_t j = 0;
+    theory.lookups = profile.integrate(0, [&](const RayProfile::Node&) { return alive[j++]; });
+    if (ray.channels == 1) theory.variance = std::exp(-seen) * -std::expm1(-seen);
+    if (ray.channels > 1 && constant) theory.variance = variance_of_constant(ray, profile, c);
+    return theory;
+  }
+
+ private:
+  static int choose(const Value& chance, int channels, auto& rng) {
+    if (channels == 1) return 0;
+    Real left = rng.uniform() * channels;
+    int hero = 0;
+    while (hero + 1 < channels && !(left < channel(chance, hero))) left -= channel(chance, hero++);
+    return hero;
+  }
+
+  static std::optional<Real> variance_of_constant(const Passage<Value>& ray, const RayProfile& profile, int c) {
+    const Real depth = ray.majorant.total_depth();
+    constexpr Real kDeepest = 1e5;
+    if (profile.nodes(c).empty() || !(depth > 0)) return 0;
+    if (depth > kDeepest) return std::nullopt;
+    Value ratio = ray.value(0);
+    for (int l = 0; l < ray.channels; ++l) {
+      const RayProfile::Node& at = profile.nodes(l)[0];
+      const Real mub = ray.majorant.rate(at.piece);
+      channel(ratio, l) = (mub - std::min(at.extinction, mub)) / mub;
+    }
+    const Real own = channel(ratio, c), mean = std::exp(-(1 - own) * depth);
+    Value chance = ray.value(1);  // a^k
+    Real second = 0;
+    const Real last = depth + 12 * std::sqrt(depth) + 40;
+    for (Real k = 0; k < last && average(chance) > 0; ++k) {
+      second +=
+          std::exp(k * std::log(depth) - depth - std::lgamma(k + 1)) * channel(chance, c) * channel(chance, c) / average(chance);
+      chance *= ratio;
+    }
+    return std::max<Real>(0, second - mean * mean);
+  }
+};
+
+}  // namespace nullmark

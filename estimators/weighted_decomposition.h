@@ -1,0 +1,143 @@
+#pragma once
+
+#include <numeric>
+
+#include "estimators/control.h"
+#include "estimators/kinks.h"
+#include "estimators/survival.h"
+
+namespace nullmark {
+
+/// Weighted decomposition tracking [Kutz et al. 2017, Sec. 4.2].  Flights at rate mub; with probability mu_c/mub the collision
+/// is the control's, without a lookup and at weight exactly 1; else residual (mu - mu_c) and null (mub - mu) are chosen by their
+/// absolute values, A in sum, and the weight is multiplied by sgn A/(mub - mu_c).  Of several constant controls each is picked
+/// with mu_i/mub at weight 1, so that their sum mu_c alone shows.  Unbiased for any mub > mu_c; all weights are 1 where mu_c <=
+/// mu <= mub, signed elsewhere.  With K = exp(-int mub - A |mu_n|/(mub - mu_c)): E[X^2] = K, lookups int (mub - mu_c)
+/// exp(-int_0^x mub - (mub - mu_c) |mu_n|/A).  Grey media.
+template <class Value>
+struct WeightedDecompositionTracking {
+  static constexpr const char* kName = "weighted_decomposition";
+  static constexpr const char* kSummary = "decomposition tracking with weights, under any controls and rates";
+  static constexpr const char* kSource = "Kutz, Habel, Li, Novak 2017, Sec. 4.2";
+  static constexpr SampleRange kRange = SampleRange::unit;
+  static constexpr bool kNeedsBound = false;
+  static constexpr bool kOwnFlights = true;
+
+  std::string control = "minimum";
+  std::vector<Real> controls;
+
+  void parameters(ParameterVisitor& visit) {
+    visit.choice("control", control, {"minimum", "average", "middle", "maximum", "medium_average", "given"},
+                 "control extinction: of the segment's bounds, of the medium, or given");
+    visit.numbers("controls", controls, 0, 16, Range::non_negative(), "1/length", "constant control extinctions (given)");
+  }
+
+  void check(const Extrema& medium) const {
+    if (medium.minimum.size() > 1)
+      throw ParameterError("type", std::string(kName) + " takes grey media only; expected one channel, found " +
+                                       std::to_string(medium.minimum.size()) +
+                                       "; \"spectral\" with control \"minimum\" decomposes chromatic media");
+    if ((control == "given") == controls.empty())
+      throw ParameterError("controls", "control \"given\" takes its extinctions from controls, the others take none");
+  }
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  SampleRange range() const { return control == "minimum" ? kRange : SampleRange::any_sign; }
+
+  struct Ray : Passage<Value> {
+    Rates control, rate;
+  };
+
+  /// The majorant is the rate; where it does not exceed the control, mu_c + max |mu - mu_c| is.
+  void prepare(Ray& ray) const {
+    ControlChoice choice;
+    choice.kind = control;
+    choice.value = std::accumulate(controls.begin(), controls.end(), Real{0});
+    Control<Value> constant;
+    Rates deviation;
+    prepare_control<Value>(choice, ray, constant, deviation);
+    ray.control.start(ray.begin);
+    ray.rate.start(ray.begin);
+    for (std::size_t i = 0; i < constant.of_segment.size(); ++i) {
+      const Segment& segment = ray.bounds.segments[i];
+      const Real mu_c = channel(constant.of_segment[i], 0);
+      ray.control.append(segment.end, mu_c);
+      ray.rate.append(segment.end, segment.majorant > mu_c ? segment.majorant : mu_c + deviation.rate(i));
+    }
+  }
+
+  struct Walk {
+    Real weight = 1, distance = 0;
+    bool done = false, looked_up = false;
+  };
+
+  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+    walk = {1, ray.end, false, false};
+    flight.start(ray.rate);
+  }
+
+  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+    if (walk.done || !flight.next(rng)) return false;
+    const Real mu_c = ray.control.rate(flight.piece());
+    if (rng.uniform() * flight.rate() >= mu_c && flight.rate() > mu_c) return true;
+    walk.distance = flight.position();
+    walk.done = true;
+    return false;
+  }
+
+  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+    const Parts part(channel(extinction, 0), ray.control.rate(at.piece()), at.rate());
+    const bool real = rng.uniform() * part.sum < std::abs(part.residual);
+    const Real grown = part.sum / (at.rate() - ray.control.rate(at.piece()));
+    walk.weight *= (real ? part.residual : part.null) < 0 ? -grown : grown;
+    if (!real) return;
+    walk.distance = at.position();
+    walk.done = walk.looked_up = true;
+  }
+
+  Value result(const Walk& walk, const Ray& ray) const { return ray.value(walk.done ? 0 : walk.weight); }
+
+  bool samples_events(int channels) const { return channels == 1; }
+
+  Event<Value> event(const Walk& walk, const Ray& ray) const {
+    return {walk.done ? EventKind::collision : EventKind::escape, walk.distance, ray.value(walk.weight)};
+  }
+
+  int real_collisions(const Walk& walk, const Ray&) const { return walk.looked_up; }
+
+  Theory theory(const Ray& ray, const RayProfile& smooth, int c, Quantity) const {
+    const RayProfile profile = cut_at_levels(smooth, ray.rate, {&ray.rate, &ray.control});
+    std::vector<Real> growth, rate, through, alive;
+    for (const RayProfile::Node& at : profile.nodes(c)) {
+      const Real mub = ray.rate.rate(at.piece), mu_c = ray.control.rate(at.piece);
+      const Parts part(at.extinction, mu_c, mub);
+      const Real null = std::abs(part.null);
+      rate.push_back(mub - mu_c);
+      through.push_back(part.sum > 0 ? rate.back() * null / part.sum : 0);
+      alive.push_back(mub - through.back());
+      growth.push_back(rate.back() > 0 ? part.sum * null / rate.back() - mub : -mub);
+    }
+    alive = profile.running(alive);
+    for (Real& x : alive) x = std::exp(-x);
+    const Real depth = profile.optical_depth(c);
+    std::size_t j = 0;
+    const Real second = profile.integrate(c, [&](const RayProfile::Node&) { return growth[j++]; });
+    Theory theory{.variance = std::exp(-2 * depth) * std::expm1(second + 2 * depth)};
+    state_lookups(theory, profile, rate, through, alive);
+    return theory;
+  }
+
+ private:
+  /// What a lookup splits into.  Where nothing has changed sign the sum is mub - mu_c itself, so that weights stay 1 to the last
+  /// bit.
+  struct Parts {
+    Real residual, null, sum;
+
+    Parts(Real mu, Real mu_c, Real mub) : residual(mu - mu_c), null(mub - mu), sum(std::abs(residual) + std::abs(null)) {
+      if (residual >= 0 && null >= 0) sum = mub - mu_c;
+    }
+  };
+};
+
+}  // namespace nullmark
