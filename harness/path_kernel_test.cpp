@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <boost/math/quadrature/gauss.hpp>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
+#include <cstdlib>
 #include <numbers>
 
 #include "estimators/delta.h"
@@ -17,11 +19,10 @@
 #include "media/homogeneous.h"
 #include "media/majorants/global.h"
 #include "media/majorants/grid.h"
+#include "media/volume.h"
 
 namespace nullmark {
-namespace {
-
-constexpr Real kPi = std::numbers::pi, kErrors = 5;
+namespace path_kernel_test {
 
 /// Collision probabilities from the history-aware average of what every channel carries [Kutz et al. 2017, Sec. 5]; on a grey
 /// medium, analog tracking that draws absorption and scattering itself.
@@ -68,15 +69,26 @@ struct SpectralTracking {
     else
       choose(EventKind::escape, null, n);
   }
+  /// Told by every walk that ended so.
+  inline static std::uint64_t absorbed = 0;
+  Event<Value> event(const Walk& walk, const Ray&) const {
+    absorbed += walk.event.kind == EventKind::absorb;
+    return walk.event;
+  }
   Value result(const Walk& walk, const Ray& ray) const {
     return is_collision(walk.event.kind) ? ray.value(0) : walk.event.weight;
   }
-  Event<Value> event(const Walk& walk, const Ray&) const { return walk.event; }
   int real_collisions(const Walk& walk, const Ray&) const { return is_collision(walk.event.kind); }
 };
 
+}  // namespace path_kernel_test
+
+namespace {
+
+constexpr Real kPi = std::numbers::pi, kErrors = 5;
+
 const EstimatorTemplate<DeltaTracking> kDelta;
-const EstimatorTemplate<SpectralTracking> kSpectral;
+const EstimatorTemplate<path_kernel_test::SpectralTracking> kSpectral;
 const EstimatorTemplate<RatioTracking> kRatio;
 
 std::shared_ptr<const Medium> homogeneous(Real extinction, const Vec3& lo = Vec3::Zero(), const Vec3& hi = Vec3::Ones()) {
@@ -185,7 +197,9 @@ TEST(PathFurnace, EveryPathOfAGreyMediumBringsTheEnvironmentExactly) {
         for (const EstimatorSource* sampler :
              {static_cast<const EstimatorSource*>(&kDelta), static_cast<const EstimatorSource*>(&kSpectral)}) {
           const Estimate estimate = radiance(*sampler, scene, kOblique, 2000);
-          for (const Real value : estimate.values) ASSERT_EQ(value, 2.5);
+          // Weights of the spectral tracker are 1 up to rounding.
+          const Real rounding = sampler == &kDelta ? 0 : 1e-12;
+          for (const Real value : estimate.values) ASSERT_NEAR(value, 2.5, rounding);
           EXPECT_EQ(estimate.expected[0], 2.5);
           EXPECT_GT(estimate.counters.draws, 3 * estimate.counters.samples);
         }
@@ -312,6 +326,61 @@ TEST(PathEmission, ScatteringMediaEmitTheAbsorbedShareOnly) {
       expect_mean(radiance(*sampler, scene, axis, 400000, general), spectrum({0.7 * 5 * (1 - transmittance)}));
 }
 
+/// Grids of one file with boxes of their own: heat glows through the density, int mu L_e T by Gauss points from knot to knot.
+TEST(PathEmission, AGridOfHeatGlowsThroughAGridOfDensity) {
+  const char* root = std::getenv("NULLMARK_DATA");
+  if (!root) GTEST_SKIP() << "NULLMARK_DATA is not set: no folder that holds volumes/";
+  const std::string file = std::string(root) + "/volumes/usd_densityAndHeat.vdb";
+  const auto grid = [&](const char* name, Real scale) {
+    return std::make_shared<FilteredVolume<TrilinearFilter>>(std::make_shared<const VolumeData>(read_vdb(file, name)), scale);
+  };
+  const auto density = grid("density", 1), heat = grid("heat", 1);
+  const Affine to_world = density->world_to_local().inverse();
+  const Box box = density->bounds();
+  const Vec3 middle = to_world * ((box.lo + box.hi) / 2);
+  const Real size = (to_world.linear() * box.extent()).norm();
+  const auto thick = grid("density", 30 / size);
+  TransportScene scene = scene_of(thick, {}, true);
+  scene.emission = {spectrum({3}), heat};
+  const Ray ray = camera(middle - size * Vec3(0.6, 0.5, 0.62).normalized(), Vec3(0.6, 0.5, 0.62));
+
+  const Ray local = context_of(scene, ray).local;
+  std::vector<Real> knots;
+  sorted_knots(*thick, local, knots);
+  const Ray within = clipped(transformed(ray, heat->world_to_local()), heat->bounds());
+  heat->knots(within, knots);
+  knots.insert(knots.end(), {within.begin, within.end});
+  std::erase_if(knots, [&](Real t) { return t < local.begin || t > local.end; });
+  std::sort(knots.begin(), knots.end());
+  std::uint64_t reads = 0;
+  Real exact = 0, depth = 0;
+  for (std::size_t i = 1; i < knots.size(); ++i) {
+    const auto part = [&](Real end) {
+      return optical_depth(*thick, {local.origin, local.direction, knots[i - 1], end}).depth[0];
+    };
+    if (!(knots[i] > knots[i - 1])) continue;
+    exact += boost::math::quadrature::gauss<Real, 7>::integrate(
+        [&](Real t) {
+          const Vec3 p = local.at(t);
+          Real mu = 0;
+          thick->extinction({&p.x(), &p.y(), &p.z(), 1}, &mu);
+          return mu * std::exp(-depth - part(t)) * scene.emission.at<Real>(ray.at(t), 1, reads);
+        },
+        knots[i - 1], knots[i]);
+    depth += part(knots[i]);
+  }
+  EXPECT_GT(depth, 0.5);
+  EXPECT_GT(exact, 0.01);
+  for (const bool general : {false, true}) expect_mean(radiance(kDelta, scene, ray, 200000, general), spectrum({exact}));
+
+  scene.albedo = spectrum({0.8});
+  scene.mean_cosine = 0.5;
+  scene.environment.radiance = spectrum({1});
+  scene.options.next_event = NextEvent::uniform;
+  scene.towards_environment = kRatio.walkers();
+  expect_equal(radiance(kDelta, scene, ray, 20000), radiance(kSpectral, scene, ray, 20000, true, 2));
+}
+
 /// Absorption alone: the samples are those of the estimator's transmittance, bit by bit, times what lies behind.
 TEST(PathAbsorption, IsTheTransmittanceKernelTimesWhatLiesBehind) {
   const auto check = [](const EstimatorSource& estimator, TransportScene scene, Real behind, const Ray& ray, Real end) {
@@ -419,7 +488,7 @@ TEST(PathScattering, PowerExchangeBetweenSpheresIsReciprocal) {
   const Sphere one{{0.2, 0.3, 0.25}, 0.15}, other{{0.75, 0.7, 0.65}, 0.25};
   for (const bool general : {false, true}) {
     const auto power = [&](const Sphere& from, const Sphere& to, std::uint64_t key) {
-      TransportScene scene = scene_of(bump(6), spectrum({0.9}), true);
+      TransportScene scene = scene_of(bump(3), spectrum({0.9}), true);
       scene.mean_cosine = 0.6;
       scene.surfaces = {{from, spectrum({1})}, {to, {}}};
       const auto kernel = make_path_kernel(kDelta, scene, general);
@@ -427,7 +496,7 @@ TEST(PathScattering, PowerExchangeBetweenSpheresIsReciprocal) {
       const Extrema extrema = scene.medium->extrema(scene.medium->bounds());
       Estimate sum;
       sum.mean = sum.error = Spectrum::Zero(1);
-      constexpr std::uint32_t kRays = 100000;
+      constexpr std::uint32_t kRays = 200000;
       SampleBlock block;
       for (std::uint32_t i = 0; i < kRays; ++i) {
         Rng rng(SampleAddress{key, i, 0});
@@ -446,7 +515,7 @@ TEST(PathScattering, PowerExchangeBetweenSpheresIsReciprocal) {
     };
     const Estimate forth = power(one, other, 11), back = power(other, one, 23);
     expect_equal(forth, back);
-    EXPECT_LT(forth.error[0], 0.02 * forth.mean[0]);
+    EXPECT_LT(forth.error[0], 0.03 * forth.mean[0]);
   }
 }
 
@@ -534,9 +603,24 @@ TEST(PathEffects, LeftOutOnesCostNothing) {
     EXPECT_EQ((estimate.counters.draws - estimate.counters.samples) % 3, 0u);
     EXPECT_LT(estimate.counters.draws, 4 * estimate.counters.samples);
   }
-  // The general kernel also draws between absorption and scattering, and looks up.
-  const Counters general = radiance(kDelta, scene, kOblique, 5000, true).counters;
-  EXPECT_GT(general.lookups, 0u);
+  // Samplers that tell absorption apart do so only where it emits.
+  std::uint64_t& absorbed = path_kernel_test::SpectralTracking<Real>::absorbed;
+  scene = scene_of(bump(2), spectrum({0.5}));
+  absorbed = 0;
+  cost(kSpectral, scene);
+  EXPECT_EQ(absorbed, 0u);
+  scene.emission.radiance = spectrum({1});
+  cost(kSpectral, scene);
+  EXPECT_GT(absorbed, 0u);
+
+  // The general kernel draws between absorption and scattering, and looks constant extinction up.
+  scene = scene_of(homogeneous(2), spectrum({0.5}));
+  scene.options.most_scatterings = 0;
+  counters = cost(kDelta, scene);
+  EXPECT_EQ(counters.draws, counters.samples);
+  counters = radiance(kDelta, scene, kOblique, 5000, true).counters;
+  EXPECT_GT(counters.lookups, 0u);
+  EXPECT_GT(counters.draws, counters.samples + counters.lookups);
 }
 
 TEST(PathKernel, SamplesDependOnTheirAddressAlone) {
