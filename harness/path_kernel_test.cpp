@@ -462,8 +462,7 @@ TEST(PathScattering, SingleScatteringInASlabMeetsQuadrature) {
           TransportScene scene = scene_of(slab.medium, spectrum({0.4}));
           scene.environment.radiance = spectrum({2});
           scene.mean_cosine = g;
-          scene.options.next_event = next;
-          scene.options.most_scatterings = 1;
+          scene.options = {.next_event = next, .roulette_from = 1, .most_scatterings = 1};
           const Real exact = std::exp(-slab.depth(1)) + singly_scattered(slab.extinction, slab.depth, 0.4, g);
           const Estimate estimate = radiance(kDelta, scene, axis, 100000, general);
           expect_mean(estimate, spectrum({2 * exact}));
