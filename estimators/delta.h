@@ -49,10 +49,11 @@ struct DeltaTracking {
     Value transmittance;
     int walking = 0;  ///< the channel of a separate walk
     bool done = false;
+    Real distance = 0;  ///< of a grey walk's collision
   };
 
   void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
-    walk = {ray.value(1), 0, false};
+    walk = {ray.value(1), 0, false, ray.end};
     if (!ray.per_channel.empty()) flight.start(ray.per_channel[0]);
   }
 
@@ -81,11 +82,19 @@ struct DeltaTracking {
       alive = alive || channel(walk.transmittance, c) > 0;
     }
     walk.done = !alive;
+    if (walk.done) walk.distance = at.position();
   }
 
   Value result(const Walk& walk, const Ray&) const { return walk.transmittance; }
 
   Value transmittance_at(const Walk& walk, const Ray&, Real) const { return walk.transmittance; }
+
+  /// Channels that share a walk end apart.
+  bool samples_events(int channels) const { return channels == 1; }
+
+  Event<Value> event(const Walk& walk, const Ray& ray) const {
+    return {walk.done ? EventKind::collision : EventKind::escape, walk.distance, ray.value(1)};
+  }
 
   int real_collisions(const Walk& walk, const Ray& ray) const {
     if (ray.per_channel.empty()) return walk.done;

@@ -21,6 +21,8 @@ class HomogeneousWalker final : public Walker<Value> {
 
   std::unique_ptr<WalkMemory> memory() const override { return std::make_unique<State>(); }
   bool samples_events(int) const override { return true; }
+  bool needs_knots() const override { return false; }
+  bool needs_optical_depth() const override { return false; }
 
   void begin(WalkMemory& memory, const Course<Value>&, const Ray& world, const Ray&) const override {
     static_cast<State&>(memory).length = world.end - world.begin;

@@ -1,7 +1,7 @@
 #include "harness/path_kernel.h"
 
-#include "estimators/closed_form.h"
-#include "harness/block_kernel.h"
+#include <fmt/format.h>
+
 #include "harness/homogeneous_walker.h"
 #include "harness/walker.h"
 
@@ -86,7 +86,7 @@ class RadianceKernel : public Kernel {
   bool needs_knots() const override { return false; }
   bool states_theory() const override { return false; }
   bool answers(Quantity) const override { return true; }  // asked for radiance alone
-  std::size_t outputs(Quantity, const RayContext&) const { return static_cast<std::size_t>(channels_); }
+  std::size_t outputs(Quantity, const RayContext&) const override { return static_cast<std::size_t>(channels_); }
   bool flies() const override { return false; }
   bool states_count_law() const override { return false; }
   std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const override { return {}; }
@@ -101,7 +101,36 @@ class RadianceKernel : public Kernel {
   int channels_;
 };
 
-/// Where light is only absorbed: T times the radiance behind.
+/// Where light is only absorbed, by constant extinction: nothing is drawn.
+class BeerLambertKernel final : public RadianceKernel {
+  struct State final : Workspace {
+    Spectrum radiance;
+  };
+
+ public:
+  using RadianceKernel::RadianceKernel;
+
+  std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
+
+  void begin_ray(Workspace& workspace, const Medium&, const Extrema&, const RayContext& context) const override {
+    static_cast<State&>(workspace).radiance = known_radiance(scene_, camera_ray(context));
+  }
+
+  void sample(Workspace& workspace, const Medium&, const RayContext&, std::uint64_t, std::uint64_t, std::size_t count, Quantity,
+              SampleBlock& out, Counters& counters) const override {
+    const Spectrum& radiance = static_cast<State&>(workspace).radiance;
+    out.values.clear();
+    for (std::size_t i = 0; i < count; ++i) out.values.insert(out.values.end(), radiance.begin(), radiance.end());
+    out.lookups.assign(count, 0);
+    counters.samples += count;
+  }
+
+  Spectrum expected(const Workspace& workspace, const Spectrum&, Quantity) const override {
+    return static_cast<const State&>(workspace).radiance;
+  }
+};
+
+/// Where light is only absorbed, by any medium: the estimator's T times the radiance behind.
 class AbsorptionKernel final : public RadianceKernel {
   struct State final : Workspace {
     std::unique_ptr<Workspace> inner;
@@ -382,21 +411,50 @@ std::unique_ptr<const Kernel> make(const TransportScene& scene, const Effects& e
     const auto walker = std::make_shared<HomogeneousWalker<Value>>(load<Value>(extinction.data(), channels));
     return compiled_path_kernel<Value>(scene, effects, walker, walker);
   }
-  if (!sampler || !sampler->samples_events(channels))
-    throw ParameterError("type", "the estimator samples no free paths" + std::string(channels > 1 ? " of several channels" : "") +
-                                     ", which scattering and emission need; name one that answers the quantity free_path");
   return compiled_path_kernel<Value>(scene, effects, sampler, shadow ? shadow : sampler);
 }
 
+template <class Walk>
+std::string why_not(const Walk& walk, const Medium& medium) {
+  if (walk.needs_knots() && !medium.polynomial_degree()) return "the medium is not polynomial between knots";
+  const Box bounds = medium.bounds();
+  if (walk.needs_optical_depth() && !medium.optical_depth({bounds.lo, bounds.extent(), 0, 1}))
+    return "the medium has no closed-form optical depth";
+  return "";
+}
+
+template <class Value>
+std::string why_no_flights(const std::shared_ptr<const Walker<Value>>& sampler,
+                           const std::shared_ptr<const Walker<Value>>& shadow, const TransportScene& scene) {
+  const int channels = scene.medium->channels();
+  if (!sampler || !sampler->samples_events(channels))
+    return fmt::format("it samples no free paths{}, which scattering and emission need",
+                       channels > 1 ? " of several channels" : "");
+  const std::string reason = why_not(*sampler, *scene.medium);
+  return reason.empty() && shadow ? why_not(*shadow, *scene.medium) : reason;
+}
+
+Effects asked_for(const TransportScene& scene, bool general) { return general ? Effects{} : effects_of(scene); }
+
 }  // namespace
+
+std::string why_no_paths(const EstimatorSource& estimator, const TransportScene& scene, bool general) {
+  const Effects effects = asked_for(scene, general);
+  if (!effects.heterogeneous) return "";
+  if (!effects.scattering && !effects.emission) return why_not(*estimator.kernel(scene.medium->channels()), *scene.medium);
+  const Walkers walkers = estimator.walkers(), &shadow = scene.towards_environment;
+  return effects.chromatic ? why_no_flights(walkers.chromatic, shadow.chromatic, scene)
+                           : why_no_flights(walkers.grey, shadow.grey, scene);
+}
 
 std::unique_ptr<const Kernel> make_path_kernel(const EstimatorSource& estimator, const TransportScene& scene, bool general) {
   scene.check();
-  const int channels = scene.medium->channels();
-  const Effects effects = general ? Effects{} : effects_of(scene);
+  if (const std::string reason = why_no_paths(estimator, scene, general); !reason.empty())
+    throw ParameterError("type", "the estimator cannot carry light here: " + reason);
+  const Effects effects = asked_for(scene, general);
   if (!effects.scattering && !effects.emission) {
-    if (effects.heterogeneous) return std::make_unique<AbsorptionKernel>(scene, estimator.kernel(channels));
-    return std::make_unique<AbsorptionKernel>(scene, EstimatorTemplate<ClosedForm>().kernel(channels));
+    if (!effects.heterogeneous) return std::make_unique<BeerLambertKernel>(scene);
+    return std::make_unique<AbsorptionKernel>(scene, estimator.kernel(scene.medium->channels()));
   }
   const Walkers walkers = estimator.walkers();
   if (effects.chromatic) return make<Spectrum>(scene, effects, walkers.chromatic, scene.towards_environment.chromatic);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "harness/transport_scene.h"
 
@@ -24,8 +25,12 @@ namespace nullmark {
 /// `expected` is known where nothing scatters and what is emitted is constant, and in equilibrium: where medium, environment and
 /// surfaces all emit the same radiance (or the medium nothing, at albedo 1) that is what arrives.  Elsewhere it is NaN.
 ///
-/// Throws ParameterError where the scene's parts do not fit each other, or the estimator the scene.
+/// Throws ParameterError where the scene's parts do not fit each other, or the estimator the scene: see why_no_paths.
 std::unique_ptr<const Kernel> make_path_kernel(const EstimatorSource& estimator, const TransportScene& scene,
                                                bool general = false);
+
+/// Why the estimator cannot carry light through the scene, in half a sentence: it samples no free paths of so many channels, or
+/// needs of the medium what it has not.  Empty where it can.
+std::string why_no_paths(const EstimatorSource& estimator, const TransportScene& scene, bool general = false);
 
 }  // namespace nullmark

@@ -12,11 +12,14 @@
 
 #include "estimators/delta.h"
 #include "estimators/ratio.h"
+#include "estimators/regular.h"
 #include "harness/block_kernel.h"
+#include "harness/registry.h"
 #include "media/channels.h"
 #include "media/exponential.h"
 #include "media/gaussian_bump.h"
 #include "media/homogeneous.h"
+#include "media/linear.h"
 #include "media/majorants/global.h"
 #include "media/majorants/grid.h"
 #include "media/volume.h"
@@ -470,6 +473,44 @@ TEST(PathScattering, SingleScatteringInASlabMeetsQuadrature) {
         }
 }
 
+/// Every registered sampler of free paths that claims to be honest, on a grey and a chromatic slab it can walk.
+TEST(PathScattering, EveryHonestSamplerMeetsSingleScattering) {
+  const Vec3 lo(-1e4, -1e4, 0), hi(1e4, 1e4, 1);
+  const std::vector<Real> factors = {0.4, 1, 2};
+  const Spectrum albedos = spectrum({0.9, 0.4, 0.7});
+  LinearProfile profile;
+  profile.begin = 2;
+  profile.end = 0.5;
+  const auto grey = along<LinearProfile>("z", profile, lo, hi);
+  const auto exact = [&](Real factor, Real albedo) {
+    const auto depth = [=](Real z) { return factor * (2 * z - 0.75 * z * z); };
+    return std::exp(-depth(1)) + singly_scattered([=](Real z) { return factor * (2 - 1.5 * z); }, depth, albedo, 0.6);
+  };
+  int walked = 0;
+  for (const EstimatorEntry& entry : Registry<EstimatorEntry>::instance().entries()) {
+    const auto estimator = entry.make();
+    const Claim claim = estimator->claim(Quantity::free_path);
+    if (entry.planted || (claim != Claim::exact && claim != Claim::unbiased)) continue;
+    for (const bool chromatic : {false, true}) {
+      TransportScene scene = scene_of(chromatic ? times(grey, factors) : grey, chromatic ? albedos : spectrum({0.4}), true);
+      scene.mean_cosine = 0.6;
+      scene.environment.radiance = Spectrum::Ones(scene.medium->channels());
+      scene.options = {.next_event = NextEvent::phase, .most_scatterings = 1};
+      if (!why_no_paths(*estimator, scene).empty()) continue;
+      SCOPED_TRACE(entry.name + (chromatic ? ", chromatic" : ""));
+      Spectrum expected(scene.medium->channels());
+      for (Eigen::Index c = 0; c < expected.size(); ++c)
+        expected[c] = chromatic ? exact(factors[static_cast<std::size_t>(c)], albedos[c]) : exact(1, 0.4);
+      for (const bool emits : {false, true}) {  // absorption left to weights, or drawn
+        if (emits) scene.emission.radiance = scene.environment.radiance * 1e-9;
+        expect_mean(radiance(*estimator, scene, camera({0.1, 0.2, -1}, {0, 0, 1}), 40000), expected);
+      }
+      ++walked;
+    }
+  }
+  EXPECT_GE(walked, 1);
+}
+
 /// Without a limit, all orders at albedo a lie between the first order and a geometric bound: what is scattered n times is at
 /// most a^n times the environment.
 TEST(PathScattering, AllOrdersApproachSingleScatteringForSmallAlbedos) {
@@ -699,6 +740,9 @@ TEST(PathKernel, ScenesThatDoNotFitAreRefused) {
   const TransportScene good = scene_of(bump(1), spectrum({0.5}));
   EXPECT_EQ(refused(kDelta, good), "nothing");
   EXPECT_EQ(refused(kRatio, good), "type");
+  EXPECT_EQ(refused(kRatio, scene_of(bump(1), {})), "nothing");
+  EXPECT_EQ(refused(EstimatorTemplate<RegularTracking>(), scene_of(bump(1), {})), "type");
+  EXPECT_EQ(refused(kRatio, scene_of(homogeneous(1), spectrum({0.5}))), "nothing");
   EXPECT_EQ(refused(kDelta, scene_of(times(bump(1), {1, 2}), spectrum({0.5, 0.5}))), "type");
   const auto but = [&](const auto& change) {
     TransportScene scene = good;

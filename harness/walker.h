@@ -80,6 +80,10 @@ class Walker {
   /// Whether `fly` answers for so many channels.
   virtual bool samples_events(int channels) const = 0;
 
+  /// What the medium must have: a polynomial extinction between knots, an optical depth in closed form.
+  virtual bool needs_knots() const = 0;
+  virtual bool needs_optical_depth() const = 0;
+
   /// Prepares a ray in both frames, cut to the medium, with begin 0; walks along it follow.  No allocation once the memory has
   /// grown.
   virtual void begin(WalkMemory&, const Course<Value>&, const Ray& world, const Ray& local) const = 0;
@@ -106,9 +110,6 @@ class EstimatorWalker final : public Walker<Value> {
     std::array<Real, std::is_same_v<Value, Real> ? 1 : kMaxChannels> extinction;
   };
 
-  /// Relative rounding allowed to an extinction above its bound before it counts as a violation.
-  static constexpr Real kSlack = 1e-9;
-
  public:
   explicit EstimatorWalker(const E& estimator) : estimator_(estimator) {}
 
@@ -118,6 +119,17 @@ class EstimatorWalker final : public Walker<Value> {
     if constexpr (!requires(const Walk& walk, const Along& ray) { estimator_.event(walk, ray); }) return false;
     if constexpr (requires { estimator_.samples_events(channels); }) return estimator_.samples_events(channels);
     return true;
+  }
+
+  bool needs_knots() const override {
+    return requires { E::kNeedsKnots; };
+  }
+
+  bool needs_optical_depth() const override {
+    if constexpr (requires { E::kNeedsInversion; }) return true;
+    if constexpr (requires { E::kNeedsOpticalDepth; }) return E::kNeedsOpticalDepth;
+    if constexpr (requires { estimator_.needs_optical_depth(); }) return estimator_.needs_optical_depth();
+    return false;
   }
 
   void begin(WalkMemory& memory, const Course<Value>& course, const Ray& world, const Ray& local) const override {
@@ -133,7 +145,9 @@ class EstimatorWalker final : public Walker<Value> {
     ray.exact_depth.reset();
     if (needs_optical_depth()) ray.exact_depth = load<Value>(optical_depth(*course.medium, local).depth.data(), course.channels);
     ray.knots.clear();
-    if constexpr (requires { E::kNeedsKnots; }) sorted_knots(*course.medium, local, ray.knots);
+    if (needs_knots()) sorted_knots(*course.medium, local, ray.knots);
+    if constexpr (requires { E::kNeedsInversion; })
+      ray.distance_at_depth = [medium = course.medium, local](Real depth) { return distance_at_depth(*medium, local, depth); };
     ray.degree = course.medium->polynomial_degree();
     ray.entry = world.at(world.begin);
     ray.albedo = course.albedo;
@@ -161,12 +175,6 @@ class EstimatorWalker final : public Walker<Value> {
   }
 
  private:
-  bool needs_optical_depth() const {
-    if constexpr (requires { E::kNeedsOpticalDepth; }) return E::kNeedsOpticalDepth;
-    if constexpr (requires { estimator_.needs_optical_depth(); }) return estimator_.needs_optical_depth();
-    return false;
-  }
-
   void walk(State& state, const Course<Value>& course, Rng& rng, Patience& patience, Counters& counters) const {
     Flight flight;
     flight.start(state.ray.majorant);
@@ -192,7 +200,7 @@ class EstimatorWalker final : public Walker<Value> {
   static void audit(const Along& ray, const Flight& at, const Value& extinction, Counters& counters) {
     if constexpr (!requires { E::kIgnoresMajorant; }) {
       const Real bound = ray.majorant.rate(at.piece()), most = largest(extinction);
-      if (most > bound * (1 + kSlack)) {
+      if (exceeds(most, bound)) {
         ++counters.violations;
         counters.largest_violation = std::max(counters.largest_violation, most / bound);
       }
