@@ -5,24 +5,11 @@
 #include <type_traits>
 
 #include "harness/kernel.h"
+#include "harness/walker.h"
 #include "media/inversion.h"
 #include "media/logarithm.h"
 
 namespace nullmark {
-
-namespace detail {
-
-template <class E, class Value>
-struct RayOf {
-  using type = Passage<Value>;
-};
-template <class E, class Value>
-requires requires { typename E::Ray; }
-struct RayOf<E, Value> {
-  using type = typename E::Ray;
-};
-
-}  // namespace detail
 
 /// The loop that runs an estimator.  A block of walks of one ray steps together: all propose, the medium answers all points in
 /// one indirect call, all consume, the finished leave.  So there is one kernel per estimator and one per medium instead of one
@@ -373,6 +360,10 @@ class EstimatorTemplate final : public EstimatorSource {
   std::unique_ptr<const Kernel> kernel(int channels) const override {
     if (channels == 1) return std::make_unique<BlockKernel<Estimator, Real>>(grey_, 1);
     return std::make_unique<BlockKernel<Estimator, Spectrum>>(chromatic_, channels);
+  }
+  Walkers walkers() const override {
+    return {std::make_shared<EstimatorWalker<Estimator, Real>>(grey_),
+            std::make_shared<EstimatorWalker<Estimator, Spectrum>>(chromatic_)};
   }
 
  private:

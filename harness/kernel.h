@@ -115,6 +115,15 @@ class Kernel {
   virtual std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const = 0;
 };
 
+template <class Value>
+class Walker;
+
+/// An estimator as paths use it: see walker.h.  Null where it cannot.
+struct Walkers {
+  std::shared_ptr<const Walker<Real>> grey;
+  std::shared_ptr<const Walker<Spectrum>> chromatic;
+};
+
 /// An estimator's parameters before it meets a medium.
 class EstimatorSource {
  public:
@@ -128,6 +137,7 @@ class EstimatorSource {
   /// Throws ParameterError where the parameters do not fit the medium.
   virtual void check(const Extrema& medium) const = 0;
   virtual std::unique_ptr<const Kernel> kernel(int channels) const = 0;
+  virtual Walkers walkers() const { return {}; }
 };
 
 }  // namespace nullmark
