@@ -22,9 +22,10 @@ enum class Claim { exact, unbiased, consistent, biased };
 /// Values one sample can take, when the majorant bounds the extinction.
 enum class SampleRange { binary, unit, non_negative, any_sign };
 
-/// What is estimated: T = exp(-tau); tau; T at several distances of one walk; how a free flight ends.
-enum class Quantity { transmittance, optical_depth, transmittance_profile, free_path };
-inline constexpr std::size_t kQuantities = 4;
+/// What is estimated: T = exp(-tau); tau; T at several distances of one walk; how a free flight ends; the radiance that arrives
+/// along a ray, with the flights that `event` tells of.
+enum class Quantity { transmittance, optical_depth, transmittance_profile, free_path, radiance };
+inline constexpr std::size_t kQuantities = 5;
 
 /// Exact moments of one sample, where known; lookups are their expectation.
 struct Theory {

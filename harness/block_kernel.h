@@ -69,7 +69,7 @@ class BlockKernel final : public Kernel {
       if constexpr (requires { estimator_.samples_events(channels_); }) return estimator_.samples_events(channels_);
       return kSamplesEvents;
     }
-    return true;
+    return quantity == Quantity::transmittance;
   }
 
   std::size_t outputs(Quantity quantity, const RayContext& context) const override {

@@ -13,7 +13,8 @@ const std::vector<std::pair<Quantity, const char*>> kSummaries = {
     {Quantity::transmittance, "T = exp(-tau) along each ray"},
     {Quantity::optical_depth, "tau, the integral of extinction along each ray"},
     {Quantity::transmittance_profile, "T up to 8 distances of each ray, from one walk"},
-    {Quantity::free_path, "how a flight along each ray ends: where it collides, scatters or escapes, and with what weight"}};
+    {Quantity::free_path, "how a flight along each ray ends: where it collides, scatters or escapes, and with what weight"},
+    {Quantity::radiance, "light that arrives along each ray, absorbed, scattered and emitted on its way"}};
 
 Json parameters_list(ComponentKind kind, const std::string& type) {
   Json list = Json::array();

@@ -225,6 +225,9 @@ std::vector<MediumSpec> read_given_media(const Place& place) {
       const std::vector<MediumSpec> variants = read_given_media(channel);
       if (!variants[0].spectrum.empty() || !variants[0].per_channel.empty())
         channel.fail(fmt::format("its medium must be grey; expected neither \"spectrum\" nor \"{0}\" inside \"{0}\"", type));
+      if (!variants[0].albedo.empty() || !variants[0].emission.empty() || variants[0].anisotropy != 0)
+        channel.fail(
+            fmt::format("\"albedo\", \"anisotropy\" and \"emission\" belong to the whole; expected them beside \"media\""));
       media =
           crossed(media, variants, [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
     }

@@ -38,7 +38,7 @@ constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
 
 const std::vector<std::string> kAxes = {"estimator",       "medium",        "majorant", "rays",        "quantity",
                                         "samples_per_ray", "equal_lookups", "seed",     "measurement", "transport"};
-const std::vector<std::string> kSingle = {"images", "image_maximum", "own_streams", "gate"};
+const std::vector<std::string> kSingle = {"images", "image_maximum", "own_streams", "gate", "reference"};
 
 std::vector<std::string> joined(std::vector<std::string> a, const std::vector<std::string>& b) {
   a.insert(a.end(), b.begin(), b.end());
@@ -76,6 +76,16 @@ GateSpec read_gate(const Place& place) {
     gate.laws = static_cast<LawPolicy>(std::find(law_policies().begin(), law_policies().end(), policy) - law_policies().begin());
   }
   return gate;
+}
+
+GivenReference read_reference(const Place& place) {
+  place.expect_keys({"value", "error", "source"});
+  GivenReference reference;
+  for (const Place& value : place["value"].elements_or_self()) reference.value.push_back(value.number());
+  reference.error = place["error"].number();
+  if (!(reference.error >= 0)) place["error"].expected("a relative bound >= 0");
+  reference.source = place["source"].string();
+  return reference;
 }
 
 template <class Value, class Set>
@@ -136,6 +146,8 @@ std::vector<Setter> read_axis(const std::string& key, const Place& place) {
     });
   if (key == "image_maximum")
     return setters(std::vector{read_positive(place)}, [](Draft& d, Real maximum) { d.cell.image_maximum = maximum; });
+  if (key == "reference")
+    return setters(std::vector{read_reference(place)}, [](Draft& d, const GivenReference& given) { d.cell.reference = given; });
   if (key == "gate") return setters(std::vector{read_gate(place)}, [](Draft& d, const GateSpec& gate) { d.cell.gate = gate; });
   const bool flag = place.boolean();
   return {key == "images" ? Setter([flag](Draft& d) { d.cell.images = flag; })

@@ -40,7 +40,7 @@ constexpr Real kRareScore = 1e-4;
 /// all would pass.
 Real absolute_epsilon(const Cell& cell, Real mean) {
   if (cell.gate.epsilon) return *cell.gate.epsilon * mean;
-  if (cell.quantity == Quantity::optical_depth) return 0.01 * mean;
+  if (cell.quantity == Quantity::optical_depth || cell.quantity == Quantity::radiance) return 0.01 * std::abs(mean);
   const Real margin = default_epsilon(mean) * mean, absorbed = 1 - mean;
   if (cell.quantity == Quantity::free_path) return std::max(margin, kRareScore);
   constexpr Real kOfAbsorbed = 0.1;
@@ -141,7 +141,7 @@ std::uint64_t outputs_per_channel(Quantity quantity) {
 }
 
 std::uint64_t channels_of(const MediumSpec& medium) {
-  if (!medium.per_channel.empty()) return medium.per_channel.size();
+  if (medium.field.type == "channels") return medium.per_channel.size();
   return std::max<std::size_t>(1, medium.spectrum.size());
 }
 

@@ -38,7 +38,8 @@ inline const char* to_string(SampleRange range) {
 }
 
 inline const std::vector<std::string>& quantity_names() {
-  static const std::vector<std::string> kNames = {"transmittance", "optical_depth", "transmittance_profile", "free_path"};
+  static const std::vector<std::string> kNames = {"transmittance", "optical_depth", "transmittance_profile", "free_path",
+                                                  "radiance"};
   return kNames;
 }
 

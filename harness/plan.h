@@ -99,6 +99,15 @@ struct GateLevels {
   bool operator==(const GateLevels&) const = default;
 };
 
+/// A mean that the configuration gives, where none can be computed here.
+struct GivenReference {
+  std::vector<Real> value;  ///< one for all outputs or one each
+  Real error = 0;           ///< bound on its own error, relative
+  std::string source;
+
+  bool operator==(const GivenReference&) const = default;
+};
+
 /// One point of a sweep.  Indices refer to the plan's lists, in which equal specifications stand once.
 struct Cell {
   std::string id;    ///< hash of everything that decides the statistics
@@ -116,6 +125,7 @@ struct Cell {
   bool images = false;
   Real image_maximum = 1;  ///< value shown white
   GateSpec gate{};
+  std::optional<GivenReference> reference{};
 };
 
 /// How wall time is measured: one thread, repetitions interleaved at random over all cells.

@@ -33,6 +33,7 @@ EstimatorEntry estimator_entry() {
   const auto kernel = EstimatorTemplate<Estimator>().kernel(1);
   for (std::size_t i = 0; i < kQuantities; ++i)
     if (kernel->answers(static_cast<Quantity>(i))) entry.quantities.push_back(static_cast<Quantity>(i));
+  entry.quantities.push_back(Quantity::radiance);  // where nothing scatters or emits, any transmittance carries light
   entry.make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<EstimatorTemplate<Estimator>>(); };
   return entry;
 }

@@ -14,6 +14,7 @@
 #include "harness/laws.h"
 #include "harness/names.h"
 #include "harness/parameter_values.h"
+#include "harness/path_kernel.h"
 #include "harness/sampling.h"
 #include "harness/timing.h"
 #include "harness/verdict.h"
@@ -28,6 +29,7 @@ struct PreparedCell {
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const Kernel> kernel;
   std::string reason;
+  std::vector<std::string> effects;  ///< of a radiance
   Targets targets;
   CellTheory theory;
   std::uint64_t samples_per_ray = 0;
@@ -81,13 +83,36 @@ class Workshop {
     prepared.claim = source->claim(cell.quantity);
     prepared.range = source->range();
     prepared.needs_bound = source->needs_bound();
-    prepared.kernel = source->kernel(prepared.scene->medium->medium->channels());
-    prepared.reason = why_not(cell, *prepared.scene, *prepared.kernel);
-    if (prepared.reason.empty()) prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity);
+    if (cell.quantity == Quantity::radiance) {
+      add_light(prepared, *source);
+    } else {
+      prepared.kernel = source->kernel(prepared.scene->medium->medium->channels());
+      prepared.reason = why_not(cell, *prepared.scene, *prepared.kernel);
+    }
+    if (prepared.reason.empty())
+      prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity, cell.reference);
     return prepared;
   }
 
  private:
+  /// The kernel of a radiance, composed from the scene's effects.
+  void add_light(PreparedCell& prepared, const EstimatorSource& source) {
+    const Cell& cell = *prepared.cell;
+    const TransportScene light = located(plan_.media[cell.medium].field.pointer, [&] {
+      return make_transport_scene(plan_.media[cell.medium], *prepared.scene->medium, prepared.scene->majorant, cell.transport);
+    });
+    prepared.effects = effect_names(cell.transport.general ? Effects{} : effects_of(light));
+    prepared.reason = why_no_paths(source, light, cell.transport.general);
+    if (!prepared.reason.empty()) return;
+    prepared.kernel = make_path_kernel(source, light, cell.transport.general);
+    // A path whose flights have weight 1 carries the radiance of one place; with next events it adds up several.
+    const bool one_place = prepared.range == SampleRange::binary && light.options.next_event == NextEvent::off &&
+                           light.medium->channels() == 1 && prepared.scene->bounding && brightest(light) <= 1;
+    prepared.range = one_place                                 ? SampleRange::unit
+                     : prepared.range == SampleRange::any_sign ? SampleRange::any_sign
+                                                               : SampleRange::non_negative;
+  }
+
   static std::string why_not(const Cell& cell, const Scene& scene, const Kernel& kernel) {
     if (!kernel.answers(cell.quantity))
       return fmt::format("{} does not answer {}", cell.estimator.type, to_string(cell.quantity));
@@ -108,7 +133,12 @@ class Workshop {
   std::shared_ptr<const Scene> scene(const Cell& cell) {
     const bool told_at_marks = cell.quantity == Quantity::transmittance_profile || cell.quantity == Quantity::free_path;
     const std::size_t kind = told_at_marks ? static_cast<std::size_t>(cell.quantity) : 0;
-    return once(scenes_, std::array{cell.medium, cell.majorant, cell.rays, kind}, [&] {
+    // Surfaces end rays; a radiance looks for them itself, along every leg of its paths.
+    const std::vector<SurfaceSpec> surfaces =
+        cell.quantity == Quantity::radiance ? std::vector<SurfaceSpec>{} : cell.transport.surfaces;
+    const std::size_t cut = static_cast<std::size_t>(std::find(cuts_.begin(), cuts_.end(), surfaces) - cuts_.begin());
+    if (cut == cuts_.size()) cuts_.push_back(surfaces);
+    return once(scenes_, std::array{cell.medium, cell.majorant, cell.rays, kind, cut}, [&] {
       const auto medium = once(media_, cell.medium, [&] {
         return located(plan_.media[cell.medium].field.pointer,
                        [&] { return std::make_shared<const BuiltMedium>(build_medium(plan_.media[cell.medium])); });
@@ -119,14 +149,16 @@ class Workshop {
                        [&] { return std::shared_ptr<const MajorantStructure>(make_majorant(majorant)->build(medium->medium)); });
       });
       const Component& set = plan_.ray_sets[cell.rays];
-      const auto rays = once(rays_, std::array{cell.medium, cell.rays}, [&] {
-        return located(set.pointer, [&] { return std::make_shared<const BuiltRays>(build_rays(set, *medium)); });
+      const auto rays = once(rays_, std::array{cell.medium, cell.rays, cut}, [&] {
+        return located(set.pointer, [&] {
+          return std::make_shared<const BuiltRays>(cut_at(build_surfaces(surfaces, 1), build_rays(set, *medium)));
+        });
       });
-      const auto reference = once(references_, std::array{cell.medium, cell.rays},
+      const auto reference = once(references_, std::array{cell.medium, cell.rays, cut},
                                   [&] { return std::make_shared<const Reference>(compute_reference(*medium, *rays)); });
       std::shared_ptr<const Marks> marks;
       if (told_at_marks)
-        marks = once(marks_, std::array{cell.medium, cell.rays, kind},
+        marks = once(marks_, std::array{cell.medium, cell.rays, kind, cut},
                      [&] { return std::make_shared<const Marks>(compute_marks(*medium, *rays, cell.quantity)); });
       return std::make_shared<const Scene>(
           Scene{medium, structure, rays, reference, marks, bounds_everywhere(*structure, *rays)});
@@ -137,10 +169,11 @@ class Workshop {
   std::map<std::size_t, std::string> missing_;
   std::map<std::size_t, std::shared_ptr<const BuiltMedium>> media_;
   std::map<std::array<std::size_t, 2>, std::shared_ptr<const MajorantStructure>> structures_;
-  std::map<std::array<std::size_t, 2>, std::shared_ptr<const BuiltRays>> rays_;
-  std::map<std::array<std::size_t, 2>, std::shared_ptr<const Reference>> references_;
-  std::map<std::array<std::size_t, 3>, std::shared_ptr<const Marks>> marks_;
-  std::map<std::array<std::size_t, 4>, std::shared_ptr<const Scene>> scenes_;
+  std::vector<std::vector<SurfaceSpec>> cuts_;  ///< that end rays
+  std::map<std::array<std::size_t, 3>, std::shared_ptr<const BuiltRays>> rays_;
+  std::map<std::array<std::size_t, 3>, std::shared_ptr<const Reference>> references_;
+  std::map<std::array<std::size_t, 4>, std::shared_ptr<const Marks>> marks_;
+  std::map<std::array<std::size_t, 5>, std::shared_ptr<const Scene>> scenes_;
 };
 
 /// Theory of all runnable cells, scene by scene; a measurement stage changes the law of the samples, so those cells have none.
@@ -219,8 +252,8 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function
 bool is_judged(const PreparedCell& prepared) {
   const bool predicts_itself = !prepared.theory.ray_variance.empty();
   const bool claims = prepared.claim == Claim::exact || prepared.claim == Claim::unbiased ||
-                      (prepared.claim == Claim::consistent && predicts_itself);
-  return prepared.cell->gate.enabled && claims && prepared.cell->measurement == Measurement{};
+                      (prepared.claim == Claim::consistent && predicts_itself && prepared.targets.names.empty());
+  return prepared.cell->gate.enabled && claims && prepared.targets.known && prepared.cell->measurement == Measurement{};
 }
 
 /// The tests of a cell; nothing for cells that claim nothing that could be tested.
@@ -334,6 +367,7 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
     record.rays = prepared.scene->rays->world.size();
     record.medium_hash = fmt::format("{:016x}", prepared.scene->medium->hash);
     if (record.channels > 1) record.effects.push_back("chromatic");
+    if (cell.quantity == Quantity::radiance) record.effects = prepared.effects;
   }
   return record;
 }
@@ -383,10 +417,12 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
     }
     ChannelRecord out;
     out.mean = finite(mean / n);
-    out.reference = finite(reference / n);
-    out.reference_error = finite(error / n);
-    out.bias = finite(bias / n);
-    out.rmse = finite(std::sqrt(squares / n));
+    if (targets.known) {
+      out.reference = finite(reference / n);
+      out.reference_error = finite(error / n);
+      out.bias = finite(bias / n);
+      out.rmse = finite(std::sqrt(squares / n));
+    }
     if (record.cell.samples_per_ray > 1) out.variance = finite(variance / n);
     if (o < prepared.theory.variance.size() && prepared.theory.variance[o]) {
       out.variance_theory = finite(*prepared.theory.variance[o]);

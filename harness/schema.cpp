@@ -134,6 +134,11 @@ Json definitions() {
            {"laws", described({{"enum", law_policies()}},
                               "when the laws of walks are tested: undecided means only where the mean cannot decide")}}),
       "what the verdict must prove and may cost");
+  cell["reference"] = described(closed_object({{"value", one_or_list(Json{{"type", "number"}})},
+                                               {"error", {{"type", "number"}, {"minimum", 0}}},
+                                               {"source", {{"type", "string"}}}},
+                                              {"value", "error", "source"}),
+                                "a mean computed elsewhere, with a relative bound on its error");
   cell["own_streams"] = described({{"type", "boolean"}, {"default", false}},
                                   "random streams keyed by the estimator too, instead of common random numbers");
   Json experiment = cell;

@@ -63,6 +63,10 @@ void add_matter(Json& json, const MediumSpec& medium) {
   if (!medium.emission_field.empty()) json["emission"]["field"] = medium_json(medium.emission_field[0]);
 }
 
+Json reference_json(const GivenReference& reference) {
+  return {{"value", reference.value}, {"error", reference.error}, {"source", reference.source}};
+}
+
 Json measurement_json(const Measurement& measurement) {
   return {{"clamp", measurement.clamp}, {"quantise_bits", measurement.quantise_bits}};
 }
@@ -109,6 +113,7 @@ std::string applied_config(const Plan& plan) {
     entry["images"] = cell.images;
     entry["image_maximum"] = cell.image_maximum;
     entry["gate"] = gate_json(cell.gate);
+    if (cell.reference) entry["reference"] = reference_json(*cell.reference);
     experiments.back()["include"].push_back(std::move(entry));
   }
   const Json json = {{"$schema", kConfigSchema},

@@ -16,6 +16,7 @@ Json component_json(const Component& component);
 Json medium_json(const MediumSpec& medium);
 /// Adds what a medium does to light beside removing it: albedo, anisotropy, emission.
 void add_matter(Json& json, const MediumSpec& medium);
+Json reference_json(const GivenReference& reference);
 Json measurement_json(const Measurement& measurement);
 /// In the order of LawPolicy.
 const std::vector<std::string>& law_policies();

@@ -5,6 +5,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace nullmark {
@@ -37,7 +38,7 @@ std::vector<std::string> output_names(Quantity quantity, const Scene& scene) {
 
 }  // namespace
 
-Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quantity) {
+Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quantity, const std::optional<GivenReference>& given) {
   const std::size_t rays = scene.rays->world.size();
   const auto channels = static_cast<std::size_t>(scene.reference->channels);
   Targets targets;
@@ -52,14 +53,14 @@ Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quant
     Memory& mine = memory.local();
     for (std::size_t ray = range.begin(); ray < range.end(); ++ray) {
       Real *mean = &targets.mean[ray * targets.outputs], *error = &targets.error[ray * targets.outputs];
-      if (quantity == Quantity::transmittance || quantity == Quantity::optical_depth) {
+      if (quantity != Quantity::transmittance_profile && quantity != Quantity::free_path) {
         scene.context(ray, kernel, mine.context);
         kernel.begin_ray(*mine.workspace, *scene.medium->medium, scene.medium->extrema, mine.context);
         const Spectrum expected = kernel.expected(*mine.workspace, scene.reference->at(ray), quantity);
         for (std::size_t c = 0; c < channels; ++c) {
           mean[c] = expected[static_cast<Eigen::Index>(c)];
           const Real depth_error = scene.reference->error[ray * channels + c];
-          error[c] = quantity == Quantity::transmittance ? mean[c] * depth_error : depth_error;
+          error[c] = quantity == Quantity::optical_depth ? depth_error : std::abs(mean[c]) * depth_error;
         }
         continue;
       }
@@ -98,6 +99,22 @@ Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quant
       }
     }
   });
+  if (given) {
+    if (given->value.size() != 1 && given->value.size() != targets.outputs)
+      throw ParameterError(
+          "reference", fmt::format("found {} values; expected one, or {}, one an output", given->value.size(), targets.outputs));
+    for (std::size_t i = 0; i < targets.mean.size(); ++i) {
+      targets.mean[i] = given->value[given->value.size() > 1 ? i % targets.outputs : 0];
+      targets.error[i] = std::abs(targets.mean[i]) * given->error;
+    }
+    targets.method = "given: " + given->source;
+  }
+  targets.known = std::all_of(targets.mean.begin(), targets.mean.end(), [](Real x) { return std::isfinite(x); });
+  if (!targets.known) {
+    targets.mean.assign(targets.mean.size(), 0);
+    targets.error.assign(targets.error.size(), 0);
+    targets.method = "none";
+  }
   return targets;
 }
 

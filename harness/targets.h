@@ -14,6 +14,7 @@ struct Targets {
   std::vector<std::string> names;  ///< per output; empty where outputs are channels
   std::vector<Real> mean, error;   ///< [ray * outputs + o]; the error is a bound on the mean's own
   std::string method;              ///< how they were computed
+  bool known = true;               ///< false: no mean is known, and those above are 0
 };
 
 /// Exact means of a quantity on every ray of a scene.
@@ -22,6 +23,10 @@ struct Targets {
 ///   transmittance_profile          T(begin, x) at kProfileMarks equidistant x
 ///   free_path                      E[w; collision in bin] of kFreePathBins bins, T(x_j) - T(x_{j+1}) each; E[w; scattered],
 ///                                  albedo (1 - T), where anything scatters; E[w; escape] = T; E[w] = 1
-Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quantity);
+///   radiance                       closed form where nothing scatters, and in equilibrium
+///
+/// What the configuration gives takes their place.
+Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quantity,
+                        const std::optional<GivenReference>& given = {});
 
 }  // namespace nullmark

@@ -10,6 +10,7 @@
 #include "estimators/transport/phase.h"
 #include "estimators/transport/surface.h"
 #include "harness/kernel.h"
+#include "harness/scene.h"
 #include "media/majorants/majorant.h"
 
 namespace nullmark {
@@ -55,6 +56,20 @@ struct Effects {
 
   bool operator==(const Effects&) const = default;
 };
+
+/// Surfaces of specifications; `channels` of radiance.  Throws ParameterError.
+std::vector<Surface> build_surfaces(const std::vector<SurfaceSpec>& specs, int channels);
+
+/// Rays ended at the first surface they meet.
+BuiltRays cut_at(const std::vector<Surface>& surfaces, BuiltRays rays);
+
+/// The scene of a specification.  Throws ParameterError where its parts do not fit the medium, MissingData where a field of
+/// emission has no file.
+TransportScene make_transport_scene(const MediumSpec& medium, const BuiltMedium& built,
+                                    std::shared_ptr<const MajorantStructure> majorant, const TransportSpec& transport);
+
+/// Largest radiance of environment, surfaces and emission; infinite where emission varies in space.
+Real brightest(const TransportScene& scene);
 
 Effects effects_of(const TransportScene& scene);
 
