@@ -81,4 +81,21 @@ void state_lookups_until_killed(Theory& theory, const RayProfile& profile, F&& e
   if (profile.channels() > 1) theory.lookups_variance.reset();
 }
 
+/// Variance of the weight w with which a flight ends, E[w] = 1, from two functions at the nodes of the profile: the rate at which
+/// E[w^2; still flying] = K grows, and the rate of collisions times their w^2 over K.  E[w^2] = int collisions K dx + K(end).
+inline Real weight_variance(const RayProfile& profile, int c, const std::vector<Real>& growth,
+                            const std::vector<Real>& collisions) {
+  const std::vector<Real> before = profile.running(growth);
+  std::size_t j = 0;
+  Real total = 0;
+  const Real ended = profile.integrate(c, [&](const RayProfile::Node& at) {
+    const std::size_t i = j++;
+    total += at.weight * growth[i];
+    return collisions[i] * std::exp(before[i]);
+  });
+  constexpr Real kRounding = 1e-12;
+  const Real variance = ended + std::exp(total) - 1;
+  return variance > kRounding ? variance : 0;
+}
+
 }  // namespace nullmark

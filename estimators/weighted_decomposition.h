@@ -128,6 +128,22 @@ struct WeightedDecompositionTracking {
     return theory;
   }
 
+  /// E[w^2; collision] = int [mu_c + |mu - mu_c| A/(mub - mu_c)] K dx.
+  Theory weight_theory(const Ray& ray, const RayProfile& smooth, int c) const {
+    const RayProfile profile = cut_at_levels(smooth, ray.rate, {&ray.rate, &ray.control});
+    std::vector<Real> growth, collisions;
+    for (const RayProfile::Node& at : profile.nodes(c)) {
+      const Real mub = ray.rate.rate(at.piece), mu_c = ray.control.rate(at.piece);
+      const Parts part(at.extinction, mu_c, mub);
+      const Real grown = mub > mu_c ? part.sum / (mub - mu_c) : 0;
+      growth.push_back(grown * std::abs(part.null) - mub);
+      collisions.push_back(mu_c + grown * std::abs(part.residual));
+    }
+    Theory theory = this->theory(ray, smooth, c, Quantity::free_path);
+    theory.variance = weight_variance(profile, c, growth, collisions);
+    return theory;
+  }
+
  private:
   /// What a lookup splits into.  Where nothing has changed sign the sum is mub - mu_c itself, so that weights stay 1 to the last
   /// bit.

@@ -78,6 +78,20 @@ struct WeightedDeltaTracking {
     return theory;
   }
 
+  /// E[w^2; collision] = int mu (mu + |mu_n|)/mub K dx.
+  Theory weight_theory(const Passage<Value>& ray, const RayProfile& smooth, int c) const {
+    const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
+    std::vector<Real> growth, collisions;
+    for (const RayProfile::Node& at : profile.nodes(c)) {
+      const Real mub = ray.majorant.rate(at.piece), grown = mub > 0 ? sum_of_rates(at.extinction, mub) / mub : 0;
+      growth.push_back(std::abs(mub - at.extinction) * grown - mub);
+      collisions.push_back(at.extinction * grown);
+    }
+    Theory theory = this->theory(ray, smooth, c, Quantity::free_path);
+    theory.variance = weight_variance(profile, c, growth, collisions);
+    return theory;
+  }
+
  private:
   /// mu + |mub - mu|; mub itself where it bounds, so that weights stay 1 to the last bit.
   static Real sum_of_rates(Real mu, Real mub) { return mu > mub ? mu + (mu - mub) : mub; }

@@ -406,7 +406,7 @@ struct Selector {
 struct DraftRow {
   TableRow row;
   std::vector<Selector> cells;
-  std::optional<Selector> theory;
+  std::optional<Selector> theory, relative_to;
 };
 
 struct DraftTable {
@@ -454,7 +454,7 @@ DraftTable read_table(const Place& place, const std::vector<Draft>& drafts, cons
   draft.table.title = place["title"].string();
   if (place.has("metric")) draft.table.metric = place["metric"].one_of(metric_names(), "metric");
   for (const Place& entry : place["rows"].elements()) {
-    entry.expect_keys({"label", "given", "cells", "theory", "note"});
+    entry.expect_keys({"label", "given", "cells", "theory", "note", "relative_to", "tolerance"});
     DraftRow row;
     row.row.label = entry["label"].string();
     if (entry.has("note")) row.row.note = entry["note"].string();
@@ -471,6 +471,12 @@ DraftTable read_table(const Place& place, const std::vector<Draft>& drafts, cons
       }
     }
     if (entry.has("theory")) row.theory = read_selector(entry["theory"], drafts, experiments);
+    if (entry.has("relative_to")) row.relative_to = read_selector(entry["relative_to"], drafts, experiments);
+    if (entry.has("tolerance")) {
+      row.row.tolerance = read_positive(entry["tolerance"]);
+      if (row.row.given.empty() || row.row.cells.empty())
+        entry["tolerance"].fail("found without \"given\" and \"cells\", which it compares");
+    }
     draft.rows.push_back(std::move(row));
   }
   return draft;
@@ -572,6 +578,7 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
       for (DraftRow& row : draft.rows) {
         for (std::size_t i = 0; i < row.cells.size(); ++i) row.row.cells[i].second = resolved(row.cells[i], plan, first);
         if (row.theory) row.row.theory_of = resolved(*row.theory, plan, first);
+        if (row.relative_to) row.row.relative_to = resolved(*row.relative_to, plan, first);
         draft.table.rows.push_back(std::move(row.row));
       }
       plan.tables.push_back(std::move(draft.table));

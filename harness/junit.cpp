@@ -1,9 +1,10 @@
-#include "harness/junit.h"
 
 #include <fmt/format.h>
 
 #include <string_view>
 
+#include "harness/expectation.h"
+#include "harness/expectation.h"
 #include "harness/order.h"
 #include "harness/results_json.h"
 #include "harness/verdict_json.h"
@@ -86,9 +87,9 @@ std::string junit(const RunRecord& run, const std::string& file) {
     cases += fmt::format(">\n      <{0} message=\"{1}\">{2}</{0}>\n    </testcase>\n", element, xml(end.message),
                          xml(reproduction(record, file)));
   }
-  std::size_t orders = 0;
+  std::size_t others = 0;
   for (const OrderFit& fit : fit_orders(run.cells)) {
-    ++orders;
+    ++others;
     const bool failed = fit.outcome == Outcome::fail;
     const char* element = failed ? "failure" : "skipped";
     cases += fmt::format("    <testcase classname=\"convergence order\" name=\"{}\"", xml(fit.name));
@@ -101,7 +102,18 @@ std::string junit(const RunRecord& run, const std::string& file) {
         failed ? fmt::format("claimed {:.0f}, measured {:.3f} +- {:.3f}", fit.claimed, fit.order, fit.half_width) : fit.reason;
     cases += fmt::format(">\n      <{0} message=\"{1}\"/>\n    </testcase>\n", element, xml(message));
   }
-  const std::string counts = fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\"", run.cells.size() + orders,
+  for (const Expectation& one : expectations(run)) {
+    ++others;
+    cases += fmt::format("    <testcase classname=\"expectation\" name=\"{}\"", xml(one.name));
+    if (one.met) {
+      cases += "/>\n";
+      continue;
+    }
+    ++(one.measured ? failures : skipped);
+    cases += fmt::format(">\n      <{0} message=\"{1}\"/>\n    </testcase>\n", one.measured ? "failure" : "skipped",
+                         xml(expectation_line(one)));
+  }
+  const std::string counts = fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\"", run.cells.size() + others,
                                          failures, errors, skipped);
   return fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites {0}>\n  <testsuite name=\"{1}\" {0}>\n{2}  "

@@ -34,6 +34,11 @@ std::optional<Real> weight(const CellRecord& record, Field field) {
   return std::nullopt;
 }
 
+/// Lookups that a flight of effective weight 1 costs: N E[w^2] [Kutz et al. 2017, Sec. 4.3].
+std::optional<Real> weighted_cost(const std::optional<Real>& lookups, const std::optional<Real>& variance) {
+  return lookups && variance ? std::optional(*lookups * (1 + *variance)) : std::nullopt;
+}
+
 std::optional<Real> best_variance(const CellRecord& record, std::size_t channel) {
   const ChannelRecord& of = record.channel[channel];
   return of.variance_theory ? of.variance_theory : of.variance;
@@ -42,10 +47,18 @@ std::optional<Real> best_variance(const CellRecord& record, std::size_t channel)
 }  // namespace
 
 const std::vector<std::string>& metric_names() {
-  static const std::vector<std::string> kNames = {"mean",          "bias",           "rmse",
-                                                  "variance",      "kurtosis",       "relative_variance",
-                                                  "ns_per_sample", "ns_per_lookup",  "lookups_per_sample",
-                                                  "weight_mean",   "weight_variance"};
+  static const std::vector<std::string> kNames = {"mean",
+                                                  "bias",
+                                                  "rmse",
+                                                  "variance",
+                                                  "kurtosis",
+                                                  "relative_variance",
+                                                  "ns_per_sample",
+                                                  "ns_per_lookup",
+                                                  "lookups_per_sample",
+                                                  "weight_mean",
+                                                  "weight_variance",
+                                                  "weighted_cost"};
   return kNames;
 }
 
@@ -59,6 +72,7 @@ std::optional<Real> metric(const CellRecord& record, std::string_view name) {
   if (name == "lookups_per_sample") return record.lookups_per_sample;
   if (name == "weight_mean") return weight(record, &ChannelRecord::mean);
   if (name == "weight_variance") return weight(record, &ChannelRecord::variance);
+  if (name == "weighted_cost") return weighted_cost(record.lookups_per_sample, weight(record, &ChannelRecord::variance));
   if (name == "ns_per_sample" && record.time) return record.time->ns_per_sample;
   if (name == "ns_per_lookup" && record.time) return record.time->ns_per_lookup;
   return std::nullopt;
@@ -70,6 +84,7 @@ std::optional<Real> metric_theory(const CellRecord& record, std::string_view nam
   if (name == "variance") return channel_average(record, &ChannelRecord::variance_theory);
   if (name == "weight_mean") return weight(record, &ChannelRecord::reference);
   if (name == "weight_variance") return weight(record, &ChannelRecord::variance_theory);
+  if (name == "weighted_cost") return weighted_cost(record.lookups_theory, weight(record, &ChannelRecord::variance_theory));
   if (name == "lookups_per_sample") return record.lookups_theory;
   return std::nullopt;
 }

@@ -142,7 +142,9 @@ struct TableRow {
   std::vector<std::pair<std::string, Real>> given;         ///< column heading, number from the source
   std::vector<std::pair<std::string, std::string>> cells;  ///< column heading, cell name
   std::optional<std::string> theory_of;                    ///< cell name whose theory column is shown
-  std::string note;                                        ///< e.g. "not reproduced"
+  std::optional<std::string> relative_to;                  ///< cell name that the row's metrics are divided by
+  std::optional<Real> tolerance;  ///< relative: every measured number must be so near the first given one
+  std::string note;               ///< e.g. "not reproduced"
 };
 struct Table {
   std::string title, metric = "rmse";

@@ -232,6 +232,8 @@ std::vector<Table> read_tables(const Place& place) {
       for (const auto& [heading, json] : at["cells"].json().items())
         row.cells.emplace_back(heading, at["cells"][heading]["cell"].string());
       if (at.has("theory")) row.theory_of = at["theory"]["cell"].string();
+      if (at.has("relative_to")) row.relative_to = at["relative_to"]["cell"].string();
+      row.tolerance = optional_real(at, "tolerance");
       table.rows.push_back(std::move(row));
     }
     tables.push_back(std::move(table));

@@ -151,12 +151,15 @@ Json definitions() {
       list_of(closed_object({{"if", reference("pattern")}, {"then", reference("pattern")}}, {"if", "then"}));
   Json selector = pattern;
   selector["experiment"] = selector["cell"] = {{"type", "string"}};
-  const Json row = closed_object({{"label", {{"type", "string"}}},
-                                  {"given", {{"type", "object"}, {"additionalProperties", {{"type", "number"}}}}},
-                                  {"cells", {{"type", "object"}, {"additionalProperties", reference("selector")}}},
-                                  {"theory", reference("selector")},
-                                  {"note", {{"type", "string"}}}},
-                                 {"label"});
+  const Json row = closed_object(
+      {{"label", {{"type", "string"}}},
+       {"given", {{"type", "object"}, {"additionalProperties", {{"type", "number"}}}}},
+       {"cells", {{"type", "object"}, {"additionalProperties", reference("selector")}}},
+       {"theory", reference("selector")},
+       {"relative_to", described(reference("selector"), "whose metric divides the row's")},
+       {"tolerance", described(positive(), "relative; check fails where a cell is farther from the first given number")},
+       {"note", {{"type", "string"}}}},
+      {"label"});
   return {{"estimator", component_schema(ComponentKind::estimator)},
           {"medium", component_schema(ComponentKind::medium)},
           {"majorant", component_schema(ComponentKind::majorant)},

@@ -93,6 +93,8 @@ Json tables_json(const std::vector<Table>& tables) {
       for (const auto& [heading, number] : row.given) entry["given"][heading] = number;
       for (const auto& [heading, cell] : row.cells) entry["cells"][heading] = {{"cell", cell}};
       if (row.theory_of) entry["theory"] = {{"cell", *row.theory_of}};
+      if (row.relative_to) entry["relative_to"] = {{"cell", *row.relative_to}};
+      if (row.tolerance) entry["tolerance"] = *row.tolerance;
       if (!row.note.empty()) entry["note"] = row.note;
       rows.push_back(std::move(entry));
     }

@@ -89,6 +89,10 @@ std::size_t configured_cells(const RunRecord& run) {
   return cells;
 }
 
+std::size_t met(const std::vector<Expectation>& all) {
+  return static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [](const Expectation& one) { return one.met; }));
+}
+
 /// For a cell of a markdown table.
 std::string escaped(const std::string& text) {
   std::string result;
@@ -149,7 +153,10 @@ Summary summarise(RunRecord& run) {
   summary.orders = fit_orders(run.cells);
   const bool order_failed =
       std::any_of(summary.orders.begin(), summary.orders.end(), [](const OrderFit& fit) { return fit.outcome == Outcome::fail; });
-  if (summary.fail > 0 || order_failed)
+  summary.expectations = expectations(run);
+  const bool disappointed = std::any_of(summary.expectations.begin(), summary.expectations.end(),
+                                        [](const Expectation& one) { return one.measured && !one.met; });
+  if (summary.fail > 0 || order_failed || disappointed)
     summary.exit = ExitCode::bias_proven;
   else if (summary.errors > 0 || summary.altered > 0)
     summary.exit = ExitCode::internal_error;
@@ -166,6 +173,10 @@ std::string summary_text(const RunRecord& run, const Summary& summary) {
     for (const CellRecord& record : run.cells)
       if (kind_of(record) == kind) text += fmt::format("{}: {}: {}\n", word(kind), record.cell.name, reason_of(record));
   for (const OrderFit& fit : summary.orders) text += fmt::format("ORDER: {}\n", order_line(fit));
+  for (const Expectation& one : summary.expectations)
+    if (!one.met) text += fmt::format("{}: {}\n", one.measured ? "EXPECTED OTHERWISE" : "NOT MEASURED", expectation_line(one));
+  if (!summary.expectations.empty())
+    text += fmt::format("{} of {} expected numbers met\n", met(summary.expectations), summary.expectations.size());
   if (summary.never_started > 0) text += fmt::format("{} cells of the configuration were never started\n", summary.never_started);
   if (summary.altered > 0) text += fmt::format("{} verdicts in the file are not what its figures say\n", summary.altered);
   return text + fmt::format("{}\n{}\n", counts(summary), families(run));
@@ -191,6 +202,11 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
   table({Kind::unexpected_open}, "Undecided", false);
   table({Kind::expected_open}, "Undecidable by their mean, as planned", false);
   table({Kind::violated}, "Need a true majorant and did not have one", false);
+  if (!summary.expectations.empty()) {
+    text += fmt::format("\n{} of {} expected numbers met.\n", met(summary.expectations), summary.expectations.size());
+    for (const Expectation& one : summary.expectations)
+      if (!one.met) text += fmt::format("- {}\n", escaped(expectation_line(one)));
+  }
   if (!summary.orders.empty()) {
     text += "\n| convergence order |\n|---|\n";
     for (const OrderFit& fit : summary.orders) text += fmt::format("| {} |\n", order_line(fit));

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "harness/exit_code.h"
+#include "harness/expectation.h"
 #include "harness/order.h"
 #include "harness/record.h"
 
@@ -14,11 +15,13 @@ struct Summary {
   std::size_t never_started = 0;  ///< interrupted, out of time, or absent from the file though the configuration has them
   std::size_t altered = 0;        ///< verdicts in the file that its own figures do not bear out
   std::vector<OrderFit> orders;
+  std::vector<Expectation> expectations;  ///< numbers that the configuration expects of its cells
   ExitCode exit = ExitCode::ok;
 };
 
-/// Decides all verdicts again, in place, and counts them.  Exit code: FAIL 3; else errors 1; else nothing judged 5; else verdicts
-/// that are open although the plan foresaw a decision, cells never started, or nothing decided at all 77; else 0.
+/// Decides all verdicts again, in place, and counts them.  Exit code: FAIL or an expectation that was measured and not met 3;
+/// else errors 1; else nothing judged 5; else verdicts that are open although the plan foresaw a decision, cells never started,
+/// or nothing decided at all 77; else 0.
 Summary summarise(RunRecord& run);
 
 /// For the terminal: counts, then every cell that did not pass with its reason.

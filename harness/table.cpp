@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "harness/expectation.h"
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/results_json.h"
@@ -102,7 +103,7 @@ const Value* value_under(const std::vector<std::pair<std::string, Value>>& row, 
   return nullptr;
 }
 
-std::string side_by_side(const Table& table, const std::map<std::string, const CellRecord*>& cells) {
+std::string side_by_side(const Table& table, const CellsByName& cells) {
   std::vector<std::string> given, answered;
   bool theory = false, note = false;
   for (const TableRow& row : table.rows) {
@@ -120,10 +121,7 @@ std::string side_by_side(const Table& table, const std::map<std::string, const C
   std::vector<Line> lines = {head};
   for (const TableRow& row : table.rows) {
     Line line = {row.label};
-    const auto cell_value = [&](const std::string& name, auto value) -> std::optional<Real> {
-      const auto at = cells.find(name);
-      return at == cells.end() ? std::nullopt : value(*at->second, table.metric);
-    };
+    const auto cell_value = [&](const std::string& name, auto value) { return row_value(cells, table, row, name, value); };
     for (const std::string& word : given) {
       const Real* number = value_under(row.given, word);
       line.push_back(number ? fmt::format("{}", *number) : "-");
@@ -175,8 +173,7 @@ std::string results_tables(const RunRecord& run) {
   }
   if (marked)
     text += fmt::format("* theory: the relative variance is above {}, too heavy a tail for the sample's own\n\n", kHeavyTail);
-  std::map<std::string, const CellRecord*> cells;
-  for (const CellRecord& record : run.cells) cells[record.cell.name] = &record;
+  const CellsByName cells = cells_by_name(run);
   for (const Table& table : run.tables) text += side_by_side(table, cells) + "\n";
   return text;
 }
