@@ -290,6 +290,12 @@ TEST(PathEmission, AConstantEmitterHasItsClosedForm) {
       expect_mean(estimate, spectrum({5 * (1 - transmittance) + 0.5 * transmittance}));
       EXPECT_NEAR(estimate.expected[0], 5 * (1 - transmittance) + 0.5 * transmittance, 1e-12);
     }
+  TransportScene walled = scene_of(along<ExponentialProfile>("x", {3, -2}), {});
+  walled.emission.radiance = spectrum({5});
+  walled.surfaces = {{Plane{{0.3, 0, 0}, {1, 0, 0}}, spectrum({2})}};
+  const Real seen = std::exp(1.5 * std::expm1(-0.6));
+  for (const bool general : {false, true})
+    expect_mean(radiance(kDelta, walled, axis, 400000, general), spectrum({5 * (1 - seen) + 2 * seen}));
   TransportScene scene = scene_of(times(bump(1), {0.5, 1, 4}), {});
   scene.emission.radiance = spectrum({1, 2, 3});
   scene.environment.radiance = spectrum({3, 0, 1});
@@ -318,15 +324,24 @@ TEST(PathEmission, AFieldEmitsWithinItsOwnBoxByQuadrature) {
 
 /// Against the same emitter seen through a scattering medium, where only unscattered emission is asked for.
 TEST(PathEmission, ScatteringMediaEmitTheAbsorbedShareOnly) {
-  TransportScene scene = scene_of(bump(4), spectrum({0.3}));
-  scene.emission.radiance = spectrum({5});
-  scene.options.most_scatterings = 0;
+  struct Case {
+    std::shared_ptr<const Medium> medium;
+    Spectrum albedo, radiance;
+    const EstimatorSource* sampler;
+  };
   const Ray axis = camera({-1, 0.5, 0.5}, {1, 0, 0});
-  const Real transmittance = std::exp(-(*scene.medium->optical_depth(context_of(scene, axis).local))[0]);
-  for (const EstimatorSource* sampler :
-       {static_cast<const EstimatorSource*>(&kDelta), static_cast<const EstimatorSource*>(&kSpectral)})
+  for (const Case& one :
+       {Case{bump(4), spectrum({0.3}), spectrum({5}), &kDelta}, Case{bump(4), spectrum({0.3}), spectrum({5}), &kSpectral},
+        Case{homogeneous(4), spectrum({0.3}), spectrum({5}), &kDelta},
+        Case{times(homogeneous(4), {0.2, 1}), spectrum({0.3, 0.8}), spectrum({5, 2}), &kSpectral},
+        Case{times(bump(4), {0.2, 1}), spectrum({0.3, 0.8}), spectrum({5, 2}), &kSpectral}}) {
+    TransportScene scene = scene_of(one.medium, one.albedo);
+    scene.emission.radiance = one.radiance;
+    scene.options.most_scatterings = 0;
+    const Spectrum transmittance = (-*scene.medium->optical_depth(context_of(scene, axis).local)).exp();
     for (const bool general : {false, true})
-      expect_mean(radiance(*sampler, scene, axis, 400000, general), spectrum({0.7 * 5 * (1 - transmittance)}));
+      expect_mean(radiance(*one.sampler, scene, axis, 200000, general), (1 - one.albedo) * one.radiance * (1 - transmittance));
+  }
 }
 
 /// Grids of one file with boxes of their own: heat glows through the density, int mu L_e T by Gauss points from knot to knot.
