@@ -111,7 +111,7 @@ class Workshop {
       const Component& majorant = plan_.majorants[cell.majorant];
       const auto structure = once(structures_, std::array{cell.medium, cell.majorant}, [&] {
         return located(majorant.pointer,
-                       [&] { return std::shared_ptr<const MajorantStructure>(make_majorant(majorant)->build(medium->medium)); });
+                       [&] { return std::make_shared<const BuiltMajorant>(build_majorant(majorant, *medium)); });
       });
       const Component& set = plan_.ray_sets[cell.rays];
       const auto rays = once(rays_, std::array{cell.medium, cell.rays}, [&] {
@@ -126,7 +126,7 @@ class Workshop {
   const Plan& plan_;
   std::map<std::size_t, std::string> missing_;
   std::map<std::size_t, std::shared_ptr<const BuiltMedium>> media_;
-  std::map<std::array<std::size_t, 2>, std::shared_ptr<const MajorantStructure>> structures_;
+  std::map<std::array<std::size_t, 2>, std::shared_ptr<const BuiltMajorant>> structures_;
   std::map<std::array<std::size_t, 2>, std::shared_ptr<const BuiltRays>> rays_;
   std::map<std::array<std::size_t, 2>, std::shared_ptr<const Reference>> references_;
   std::map<std::array<std::size_t, 3>, std::shared_ptr<const Scene>> scenes_;
@@ -319,6 +319,7 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
   if (prepared.scene) {
     record.channels = prepared.scene->medium->medium->channels();
     record.rays = prepared.scene->rays->world.size();
+    record.structure = prepared.scene->majorant->structure->size();
     record.medium_hash = fmt::format("{:016x}", prepared.scene->medium->hash);
     if (record.channels > 1) record.effects.push_back("chromatic");
   }
@@ -513,7 +514,9 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     for (std::size_t i = 0; i < times.size(); ++i) {
       CellRecord& record = records[to_time[i]->index];
       record.time = times[i];
-      if (times[i]) observer.cell_timed(record);
+      if (!times[i]) continue;
+      record.time->majorant_build_seconds = to_time[i]->scene->majorant->build_seconds;
+      observer.cell_timed(record);
     }
   }
   if (effort.working > 0) observer.verdict_share(effort.judging / (effort.working - effort.judging));

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
+#include <chrono>
 #include <numeric>
 
 #include "estimators/gauss_points.h"
@@ -45,6 +46,14 @@ BuiltMedium build_medium(const MediumSpec& spec) {
   }
   const std::uint64_t content = built.medium->content_hash();
   built.hash = fnv1a({reinterpret_cast<const char*>(&content), sizeof content}, fnv1a(spec.label));
+  return built;
+}
+
+BuiltMajorant build_majorant(const Component& spec, const BuiltMedium& medium) {
+  const auto source = make_majorant(spec);
+  const auto start = std::chrono::steady_clock::now();
+  BuiltMajorant built{source->build(medium.medium)};
+  built.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return built;
 }
 
@@ -147,7 +156,7 @@ void Scene::context(std::size_t ray, const Kernel& kernel, RayContext& out) cons
   out.world = rays->world[ray];
   out.local = rays->local[ray];
   out.index = static_cast<std::uint32_t>(ray);
-  majorant->segments(out.world, out.local, out.segments);
+  majorant->structure->segments(out.world, out.local, out.segments);
   out.knots.clear();
   out.exact_depth.reset();
   if (kernel.needs_knots()) sorted_knots(*medium->medium, out.local, out.knots);
