@@ -44,8 +44,8 @@ struct AnalogDecompositionTracking {
   };
 
   void prepare(Ray& ray) const {
-    ray.control.start(ray.begin);
-    ray.residual.start(ray.begin);
+    ray.control.start(ray.begin, ray.bounds.crossing);
+    ray.residual.start(ray.begin, ray.bounds.crossing);
     for (const Segment& segment : ray.bounds.segments) {
       const Real mu_c = control == "given" ? value : factor * segment.extinction.minimum[0];
       ray.control.append(segment.end, mu_c);

@@ -92,7 +92,7 @@ void prepare_control(const ControlChoice& choice, const Passage<Value>& ray, Con
   control.length = ray.length();
   control.first = choice.value;
   control.depth = ray.value(0);
-  residual.start(ray.begin);
+  residual.start(ray.begin, ray.bounds.crossing);
   if (!(ray.length() > 0)) return;
   if (control.linear) {
     control.growth = choice.value_end - choice.value;
@@ -123,7 +123,7 @@ void prepare_control(const ControlChoice& choice, const Passage<Value>& ray, Con
       if (choice.kind == "gamma") {
         for (int c = 0; c < ray.channels; ++c) {
           const Real rate = std::max(channel(high, c) - channel(low, c), ControlChoice::kGammaRateFloor);
-          const Real raised = channel(low, c) + rate * std::expm1(std::log(choice.gamma) / (ray.bounds.cell_diagonal * rate));
+          const Real raised = channel(low, c) + rate * std::expm1(std::log(choice.gamma) / (segment.diagonal * rate));
           channel(constant, c) = std::clamp(raised, channel(low, c), std::max(channel(low, c), channel(average, c)));
         }
       }

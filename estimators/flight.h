@@ -4,16 +4,17 @@
 #include <cstddef>
 #include <vector>
 
-#include "media/types.h"
+#include "media/majorants/majorant.h"
 
 namespace nullmark {
 
 /// A piecewise constant sampling rate along a ray, 1/length, with its running depth int_begin^t rate.
 class Rates {
  public:
-  void start(Real begin) {
+  void start(Real begin, Crossing crossing = Crossing::carry) {
     pieces_.clear();
     begin_ = begin;
+    crossing_ = crossing;
   }
 
   /// Appends the piece from the current end to `end`.  Zero rates are fine, also over an infinite length.
@@ -23,6 +24,7 @@ class Rates {
   }
 
   std::size_t size() const { return pieces_.size(); }
+  Crossing crossing() const { return crossing_; }
   Real begin() const { return begin_; }
   Real end() const { return pieces_.empty() ? begin_ : pieces_.back().end; }
   Real end(std::size_t i) const { return pieces_[i].end; }
@@ -43,12 +45,13 @@ class Rates {
   };
   std::vector<Piece> pieces_;
   Real begin_ = 0;
+  Crossing crossing_ = Crossing::carry;
 };
 
 /// Where a walk is on its ray.  Flights live in majorant depth: the next tentative collision lies one unit exponential of depth
-/// ahead, whatever cells are crossed, so a collision costs one logarithm and a crossing none.  That equals cutting the flight at
-/// each cell and starting anew, because the exponential has no memory [Yue et al. 2010, Sec. 3].  Cells of rate 0 are passed
-/// over.
+/// ahead, whatever cells are crossed, so a collision costs one logarithm and a crossing none.  With Crossing::rewind the flight
+/// is cut at each cell's end and starts anew there; the depth it is cut at is where the next exponential counts from, so depths
+/// follow the same law.  Cells of rate 0 are passed over, without a draw.
 class Flight {
  public:
   void start(const Rates& rates) {
@@ -59,7 +62,11 @@ class Flight {
   }
 
   /// Moves to the next tentative collision; false when it lies beyond the ray's end.
-  bool next(auto& rng) { return advance_to(depth_ + rng.exponential()); }
+  bool next(auto& rng) {
+    if (rates_->crossing() == Crossing::rewind) [[unlikely]]
+      return next_rewinding(rng);
+    return advance_to(depth_ + rng.exponential());
+  }
 
   /// Moves forwards to the point of the given depth; false (and the ray's end) when the ray is not that deep.
   bool advance_to(Real depth) {
@@ -85,6 +92,18 @@ class Flight {
   Real depth_left() const { return rates_->total_depth() - depth_; }
 
  private:
+  [[gnu::noinline]] bool next_rewinding(auto& rng) {
+    for (; piece_ < rates_->size(); ++piece_) {
+      const Real cell_end = rates_->depth_after(piece_);
+      if (!(depth_ < cell_end)) continue;
+      const Real depth = depth_ + rng.exponential();
+      if (depth < cell_end) return advance_to(depth);
+      depth_ = cell_end;
+    }
+    position_ = rates_->end();
+    return false;
+  }
+
   const Rates* rates_ = nullptr;
   std::size_t piece_ = 0;
   Real depth_ = 0, position_ = 0;

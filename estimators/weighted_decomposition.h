@@ -57,8 +57,8 @@ struct WeightedDecompositionTracking {
     Control<Value> constant;
     Rates deviation;
     prepare_control<Value>(choice, ray, constant, deviation);
-    ray.control.start(ray.begin);
-    ray.rate.start(ray.begin);
+    ray.control.start(ray.begin, ray.bounds.crossing);
+    ray.rate.start(ray.begin, ray.bounds.crossing);
     for (std::size_t i = 0; i < constant.of_segment.size(); ++i) {
       const Segment& segment = ray.bounds.segments[i];
       const Real mu_c = channel(constant.of_segment[i], 0);

@@ -87,9 +87,9 @@ class BlockKernel final : public Kernel {
     ray.end = context.world.end;
     ray.channels = channels_;
     ray.bounds.segments.assign(context.segments.segments.begin(), context.segments.segments.end());
-    ray.bounds.cell_diagonal = context.segments.cell_diagonal;
+    ray.bounds.crossing = context.segments.crossing;
     ray.medium = extrema;
-    ray.majorant.start(ray.begin);
+    ray.majorant.start(ray.begin, ray.bounds.crossing);
     for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
     ray.exact_depth.reset();
     if (context.exact_depth) ray.exact_depth = load<Value>(context.exact_depth->data(), channels_);

@@ -81,9 +81,10 @@ int agreeing(const std::vector<CellRecord>& records) {
 TEST(Contract, EveryHonestEstimatorMeetsMeanVarianceAndLookupsOnEveryMedium) {
   const auto records = run(fmt::format(
       R"("rays":{{"type":"single","from":[0.02,0.1,0.3],"to":[0.97,0.9,0.6]}},"samples_per_ray":300000,
-          "matrix":{{"estimator":[{}],"medium":[{}],"majorant":["global",{{"type":"global","looseness":3}},{{"type":"grid","resolution":5}}]}})",
+          "matrix":{{"estimator":[{}],"medium":[{}],"majorant":["global",{{"type":"global","looseness":3}},{{"type":"grid","resolution":5}},
+                                {{"type":"kd_tree","resolution":16,"forced_depth":4,"crossing":"rewind"}}]}})",
       honest_estimators(), kMedia));
-  EXPECT_GT(agreeing(records), 200);
+  EXPECT_GT(agreeing(records), 270);
 }
 
 TEST(Contract, ChromaticMediaAreMetChannelByChannel) {

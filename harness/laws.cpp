@@ -288,7 +288,7 @@ Scene in_pieces(const Scene& scene, const std::vector<std::size_t>& rays) {
     }
   }
   auto reference = std::make_shared<const Reference>(compute_reference(*scene.medium, *pieces));
-  return {scene.medium, scene.majorant, pieces, reference, nullptr, bounds_everywhere(*scene.majorant, *pieces)};
+  return {scene.medium, scene.majorant, pieces, reference, nullptr, bounds_everywhere(*scene.majorant->structure, *pieces)};
 }
 
 /// Means of the pieces of a ray, at as many samples as the budget gives.

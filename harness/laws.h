@@ -25,6 +25,9 @@ namespace nullmark {
 ///   kolmogorov_smirnov, chi_square   the law of free paths, see free_path_law.h
 ///   segments      the ray cut into pieces shallow enough for mean tests of their own
 ///
+/// Depths are the majorant's.  Flights that are rewound at the ends of cells follow the same laws: an exponential cut at a depth and
+/// drawn anew from there leaves the collisions a Poisson process of rate 1 in depth.
+///
 /// Returns log E (or -log p) of each law that applies; a law that holds exceeds log(1/a) with probability at most a.
 struct LawBudget {
   Real lookups = 2e5;                 ///< of all walks together, about

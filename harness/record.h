@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "harness/plan.h"
+#include "media/majorants/majorant.h"
 
 namespace nullmark {
 
@@ -39,6 +40,7 @@ struct TimeRecord {
   int repetitions = 0, threads = 1;
   std::uint64_t samples_per_traversal = 1;
   std::vector<Real> repetition_ns;  ///< ns per sample of each repetition
+  Real majorant_build_seconds = 0;  ///< wall time of building the majorant structure, on all threads
 };
 
 /// PASS: |bias| < epsilon is proven.  FAIL: bias is proven.  INCONCLUSIVE: neither, with the reason.  VIOLATED: the estimator
@@ -95,6 +97,7 @@ struct CellRecord {
   MediumSpec medium;
   Component majorant, ray_set;
   std::string medium_hash;
+  std::optional<StructureSize> structure;  ///< of the majorant; absent where it was not built
   std::string claims, range;
   std::optional<Real> order;  ///< of a consistent estimator's bias in its step
   int channels = 1;

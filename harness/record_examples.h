@@ -35,6 +35,7 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
     record.majorant = plan.majorants[cell.majorant];
     record.ray_set = plan.ray_sets[cell.rays];
     record.medium_hash = "0123456789abcdef";
+    record.structure = StructureSize{7, 13, 9007199254740993};
     record.claims = "unbiased";
     record.range = "unit";
     record.channels = record.medium.spectrum.empty() ? 1 : 3;
@@ -54,7 +55,7 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
     record.draws = 9223372036854775807;
     record.majorant_violations = 3;
     record.largest_violation = 1 + 2.220446049250313e-16;
-    record.time = TimeRecord{next(), next(), next(), next(), next(), 2, 1, 64, {next(), next()}};
+    record.time = TimeRecord{next(), next(), next(), next(), next(), 2, 1, 64, {next(), next()}, next()};
     for (const std::uint64_t samples : {std::uint64_t{1}, std::uint64_t{2}}) {
       ConvergenceRecord step{samples, {}, {}};
       for (int c = 0; c < record.channels; ++c) {

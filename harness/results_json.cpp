@@ -77,6 +77,7 @@ Json time_json(const CellRecord& record) {
           {"traversal_included", true},
           {"samples_per_traversal", time.samples_per_traversal},
           {"repetition_ns", std::move(repetitions)},
+          {"majorant_build_seconds", real(time.majorant_build_seconds)},
           {"variance_x_ns", per_channel(record, [&](std::size_t c) { return variance_x_ns(record, c); })},
           {"seconds_to_1pct", real(efficiency(record).seconds_to_1pct)}};
 }
@@ -193,6 +194,7 @@ TimeRecord read_time(const Place& place) {
   time.repetitions = static_cast<int>(place["repetitions"].integer(0, std::numeric_limits<int>::max()));
   time.threads = static_cast<int>(place["threads"].integer(0, std::numeric_limits<int>::max()));
   time.samples_per_traversal = count(place, "samples_per_traversal");
+  time.majorant_build_seconds = real_or_nan(place, "majorant_build_seconds");
   if (place.has("repetition_ns"))
     for (const Place& ns : place["repetition_ns"].elements())
       time.repetition_ns.push_back(optional_real(ns).value_or(kNotANumber));
@@ -253,13 +255,19 @@ Json cell_json(const CellRecord& record) {
   if (record.order) estimator["order"] = *record.order;
   Json medium = typed(record.medium);
   medium["hash"] = record.medium_hash;
+  Json majorant = typed(record.majorant);
+  if (record.structure) {
+    majorant["cells"] = record.structure->cells;
+    majorant["nodes"] = record.structure->nodes;
+    majorant["bytes"] = record.structure->bytes;
+  }
 
   Json json = {{"id", cell.id},
                {"name", cell.name},
                {"experiment", cell.experiment},
                {"estimator", std::move(estimator)},
                {"medium", std::move(medium)},
-               {"majorant", typed(record.majorant)},
+               {"majorant", std::move(majorant)},
                {"ray_set", typed(record.ray_set)},
                {"quantity", to_string(cell.quantity)},
                {"measurement", measurement_json(cell.measurement)},
@@ -319,6 +327,9 @@ CellRecord read_cell(const Place& place) {
   record.medium = read_medium(place["medium"]);
   record.medium_hash = string_or_empty(place["medium"], "hash");
   record.majorant = read_component(ComponentKind::majorant, place["majorant"]);
+  if (place["majorant"].has("cells"))
+    record.structure =
+        StructureSize{count(place["majorant"], "cells"), count(place["majorant"], "nodes"), count(place["majorant"], "bytes")};
   record.ray_set = read_component(ComponentKind::ray_set, place["ray_set"]);
   cell.quantity = *quantity_named(place["quantity"].one_of(quantity_names(), "quantity"));
   cell.measurement.clamp = place["measurement"]["clamp"].boolean();

@@ -55,6 +55,8 @@ TEST(ResultsJson, EveryFieldComesBackBitForBit) {
     EXPECT_EQ(a.largest_violation, b.largest_violation);
     EXPECT_EQ(a.time->repetition_ns, b.time->repetition_ns);
     EXPECT_EQ(a.time->loop_ratio, b.time->loop_ratio);
+    EXPECT_EQ(a.time->majorant_build_seconds, b.time->majorant_build_seconds);
+    EXPECT_EQ(a.structure, b.structure);
     ASSERT_EQ(a.convergence.size(), b.convergence.size());
     EXPECT_EQ(a.convergence[1].variance, b.convergence[1].variance);
   }
@@ -108,6 +110,7 @@ TEST(ResultsJson, StatisticsLeaveOutTimeProvenanceAndPaths) {
   other.provenance["start"] = "\"later\"";
   other.cells[0].time.reset();
   other.cells[1].time->ns_per_sample += 1;
+  other.cells[1].time->majorant_build_seconds += 1;
   EXPECT_EQ(statistics_text(other), statistics_text(run));
   other.cells[0].channel[0].mean = std::nextafter(*other.cells[0].channel[0].mean, 1);
   EXPECT_NE(statistics_text(other), statistics_text(run));

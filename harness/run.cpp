@@ -99,7 +99,8 @@ class Workshop {
   void add_light(PreparedCell& prepared, const EstimatorSource& source) {
     const Cell& cell = *prepared.cell;
     const TransportScene light = located(plan_.media[cell.medium].field.pointer, [&] {
-      return make_transport_scene(plan_.media[cell.medium], *prepared.scene->medium, prepared.scene->majorant, cell.transport);
+      return make_transport_scene(plan_.media[cell.medium], *prepared.scene->medium, prepared.scene->majorant->structure,
+                                  cell.transport);
     });
     prepared.effects = effect_names(cell.transport.general ? Effects{} : effects_of(light));
     prepared.reason = why_no_paths(source, light, cell.transport.general);
@@ -146,7 +147,7 @@ class Workshop {
       const Component& majorant = plan_.majorants[cell.majorant];
       const auto structure = once(structures_, std::array{cell.medium, cell.majorant}, [&] {
         return located(majorant.pointer,
-                       [&] { return std::shared_ptr<const MajorantStructure>(make_majorant(majorant)->build(medium->medium)); });
+                       [&] { return std::make_shared<const BuiltMajorant>(build_majorant(majorant, *medium)); });
       });
       const Component& set = plan_.ray_sets[cell.rays];
       const auto rays = once(rays_, std::array{cell.medium, cell.rays, cut}, [&] {
@@ -161,14 +162,14 @@ class Workshop {
         marks = once(marks_, std::array{cell.medium, cell.rays, kind, cut},
                      [&] { return std::make_shared<const Marks>(compute_marks(*medium, *rays, cell.quantity)); });
       return std::make_shared<const Scene>(
-          Scene{medium, structure, rays, reference, marks, bounds_everywhere(*structure, *rays)});
+          Scene{medium, structure, rays, reference, marks, bounds_everywhere(*structure->structure, *rays)});
     });
   }
 
   const Plan& plan_;
   std::map<std::size_t, std::string> missing_;
   std::map<std::size_t, std::shared_ptr<const BuiltMedium>> media_;
-  std::map<std::array<std::size_t, 2>, std::shared_ptr<const MajorantStructure>> structures_;
+  std::map<std::array<std::size_t, 2>, std::shared_ptr<const BuiltMajorant>> structures_;
   std::vector<std::vector<SurfaceSpec>> cuts_;  ///< that end rays
   std::map<std::array<std::size_t, 3>, std::shared_ptr<const BuiltRays>> rays_;
   std::map<std::array<std::size_t, 3>, std::shared_ptr<const Reference>> references_;
@@ -365,6 +366,7 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
   if (prepared.scene) {
     record.channels = prepared.scene->medium->medium->channels();
     record.rays = prepared.scene->rays->world.size();
+    record.structure = prepared.scene->majorant->structure->size();
     record.medium_hash = fmt::format("{:016x}", prepared.scene->medium->hash);
     if (record.channels > 1) record.effects.push_back("chromatic");
     if (cell.quantity == Quantity::radiance) record.effects = prepared.effects;
@@ -562,7 +564,9 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     for (std::size_t i = 0; i < times.size(); ++i) {
       CellRecord& record = records[to_time[i]->index];
       record.time = times[i];
-      if (times[i]) observer.cell_timed(record);
+      if (!times[i]) continue;
+      record.time->majorant_build_seconds = to_time[i]->scene->majorant->build_seconds;
+      observer.cell_timed(record);
     }
   }
   if (effort.working > 0) observer.verdict_share(effort.judging / (effort.working - effort.judging));

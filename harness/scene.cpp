@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
+#include <chrono>
 #include <numeric>
 
 #include "estimators/gauss_points.h"
@@ -104,6 +105,14 @@ BuiltMedium build_medium(const MediumSpec& spec) {
   }
   const std::uint64_t content = built.medium->content_hash();
   built.hash = fnv1a({reinterpret_cast<const char*>(&content), sizeof content}, fnv1a(spec.label));
+  return built;
+}
+
+BuiltMajorant build_majorant(const Component& spec, const BuiltMedium& medium) {
+  const auto source = make_majorant(spec);
+  const auto start = std::chrono::steady_clock::now();
+  BuiltMajorant built{source->build(medium.medium)};
+  built.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return built;
 }
 
@@ -244,7 +253,7 @@ void Scene::context(std::size_t ray, const Kernel& kernel, RayContext& out) cons
   out.local = rays->local[ray];
   out.index = static_cast<std::uint32_t>(ray);
   out.albedo = medium->albedo;
-  majorant->segments(out.world, out.local, out.segments);
+  majorant->structure->segments(out.world, out.local, out.segments);
   out.marks = {};
   if (marks) out.marks = {&marks->distance[ray * marks->per_ray], marks->per_ray};
   out.knots.clear();

@@ -25,6 +25,15 @@ Spectrum per_channel(const std::vector<Real>& values, int channels, const char* 
 /// Builds a specification: the field, times its spectrum or one per channel.  Throws ParameterError or MissingData.
 BuiltMedium build_medium(const MediumSpec& spec);
 
+/// A majorant structure, with the wall time that building it took.
+struct BuiltMajorant {
+  std::shared_ptr<const MajorantStructure> structure;
+  double build_seconds = 0;
+};
+
+/// Throws ParameterError where the structure does not fit the medium.
+BuiltMajorant build_majorant(const Component& spec, const BuiltMedium& medium);
+
 /// Rays of a set, cut to a medium, in both frames.
 struct BuiltRays {
   std::vector<Ray> world, local;
@@ -69,7 +78,7 @@ void sorted_knots(const Medium& medium, const Ray& local, std::vector<Real>& out
 /// What one cell samples from: shared by all cells of the same medium, majorant and rays.
 struct Scene {
   std::shared_ptr<const BuiltMedium> medium;
-  std::shared_ptr<const MajorantStructure> majorant;
+  std::shared_ptr<const BuiltMajorant> majorant;
   std::shared_ptr<const BuiltRays> rays;
   std::shared_ptr<const Reference> reference;
   std::shared_ptr<const Marks> marks;  ///< of quantities that are told at distances; null otherwise

@@ -180,6 +180,14 @@ Json typed_schema() {
           {"required", {"type", "params", "label"}}};
 }
 
+Json majorant_schema() {
+  Json json = typed_schema();
+  json["properties"].update(Json{{"cells", described(whole(1), "regions with bounds of their own")},
+                                 {"nodes", described(whole(0), "of a tree, leaves included; 0: no tree")},
+                                 {"bytes", described(whole(0), "of memory")}});
+  return json;
+}
+
 Json nullable(const char* type) { return {{"type", {type, "null"}}}; }
 
 /// A number, a list of one per channel, or null.
@@ -199,7 +207,7 @@ Json cell_schema() {
        {"experiment", text},
        {"estimator", typed_schema()},
        {"medium", typed_schema()},
-       {"majorant", typed_schema()},
+       {"majorant", majorant_schema()},
        {"ray_set", typed_schema()},
        {"quantity", {{"enum", quantity_names()}}},
        {"channels", {{"type", "integer"}, {"minimum", 1}, {"maximum", kMaxChannels}}},

@@ -140,7 +140,7 @@ class EstimatorWalker final : public Walker<Value> {
     ray.channels = course.channels;
     course.majorant->segments(world, local, ray.bounds);
     ray.medium = *course.extrema;
-    ray.majorant.start(ray.begin);
+    ray.majorant.start(ray.begin, ray.bounds.crossing);
     for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
     ray.exact_depth.reset();
     if (needs_optical_depth()) ray.exact_depth = load<Value>(optical_depth(*course.medium, local).depth.data(), course.channels);

@@ -23,6 +23,7 @@ namespace nullmark {
 NULLMARK_REGISTER_PLANTED_BUG(PlantedBatchStreams, WrappedSource<PlantedBatchStreams>);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedBudget);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedCappedExtinction);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedCarriedDistance);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedChannelMajorant);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedChannelSwap);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedClampedRatio);

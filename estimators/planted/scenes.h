@@ -39,6 +39,8 @@ inline constexpr PlantedScene kPlantedScenes[] = {
     {"planted_first_segment", R"("planted_first_segment")", kRising, kFourCells, kThroughTheBox, 0.169118},
     // mub = mu, so T is the chance of no collision: e^{-1/4 - 2/4 - 3/4 - 1} in place of e^{-1}
     {"planted_no_rewind", R"("planted_no_rewind")", kConstant, kFourCells, kThroughTheBox, -0.776870},
+    // W(x) = e^{-b(x)(1-x)} + int_x^1 b(x) e^{-b(x)(y-x)} (1 - mu(y)/b(y)) W(y) dy, b the bound of the cell
+    {"planted_carried_distance", R"("planted_carried_distance")", kRising, kFourCells, kThroughTheBox, 0.392205},
     // 1 - e^{-1}: the first collision never counts
     {"planted_previous_extinction", R"("planted_previous_extinction")", kConstant, kTwice, kThroughTheBox, 0.632121},
     // W(x) = e^{-(1-x)} + (1 - mu(x)) int_x^1 e^{-(y-x)} W(y) dy

@@ -65,4 +65,26 @@ struct PlantedNoRewind : RatioTracking<Value> {
   }
 };
 
+/// Ratio tracking that carries the rest of a flight into the next cell as a distance, drawn at the rate of the cell it left,
+/// instead of as a depth.  Too few collisions where rates rise along the ray.
+template <class Value>
+struct PlantedCarriedDistance : RatioTracking<Value> {
+  static constexpr const char* kName = "planted_carried_distance";
+  static constexpr const char* kSummary = "wrong: ratio tracking whose flights keep their length across cell boundaries";
+  static constexpr const char* kSource = "";
+  static constexpr const char* kCaughtBy = "mean";
+
+  using Walk = typename RatioTracking<Value>::Walk;
+
+  bool propose(Walk&, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+    const Rates& rates = ray.majorant;
+    if (rates.size() == 0) return false;
+    const Real position = flight.position() + rng.exponential() / flight.rate();
+    std::size_t cell = flight.piece();
+    while (cell < rates.size() && !(position < rates.end(cell))) ++cell;
+    if (cell == rates.size()) return flight.advance_to(rates.total_depth());
+    return flight.advance_to(rates.depth_after(cell) - rates.rate(cell) * (rates.end(cell) - position));
+  }
+};
+
 }  // namespace nullmark

@@ -18,9 +18,10 @@ class GlobalMajorant final : public MajorantStructure {
 
   void segments(const Ray& world, const Ray&, SegmentBuffer& out) const override {
     out.clear();
-    out.cell_diagonal = diagonal_;
-    if (world.length() > 0) out.segments.push_back({world.begin, world.end, majorant_, extinction_});
+    if (world.length() > 0) out.segments.push_back({world.begin, world.end, majorant_, extinction_, diagonal_});
   }
+
+  StructureSize size() const override { return {1, 0, sizeof *this}; }
 
  private:
   Extrema extinction_;

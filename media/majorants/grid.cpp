@@ -4,8 +4,8 @@
 
 namespace nullmark {
 
-GridMajorant::GridMajorant(const Medium& medium, const std::array<int, 3>& resolution, Real looseness)
-    : resolution_(resolution), looseness_(looseness), box_(medium.bounds()) {
+GridMajorant::GridMajorant(const Medium& medium, const std::array<int, 3>& resolution, Real looseness, Crossing crossing)
+    : resolution_(resolution), looseness_(looseness), crossing_(crossing), box_(medium.bounds()) {
   const Vec3 size = box_.extent().cwiseQuotient(Vec3(resolution[0], resolution[1], resolution[2]));
   diagonal_ = (medium.world_to_local().inverse().linear() * size).norm();
   cells_.resize(static_cast<std::size_t>(resolution[0]) * static_cast<std::size_t>(resolution[1]) *
@@ -27,7 +27,7 @@ GridMajorant::GridMajorant(const Medium& medium, const std::array<int, 3>& resol
 
 void GridMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& out) const {
   out.clear();
-  out.cell_diagonal = diagonal_;
+  out.crossing = crossing_;
   if (!(world.length() > 0)) return;
   const Vec3 size = box_.extent().cwiseQuotient(Vec3(resolution_[0], resolution_[1], resolution_[2]));
   const Vec3 start = local.at(local.begin);
@@ -55,7 +55,7 @@ void GridMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& o
     const Real to = leaves ? world.end : std::min(next[axis], world.end);
     if (to > from) {
       const Extrema& here = cell(at);
-      out.segments.push_back({from, to, looseness_ * here.maximum.maxCoeff(), here});
+      out.segments.push_back({from, to, looseness_ * here.maximum.maxCoeff(), here, diagonal_});
       from = to;
     }
     if (leaves || !(from < world.end)) break;
@@ -64,7 +64,7 @@ void GridMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& o
   }
   if (out.segments.empty() || out.segments.back().end < world.end) {
     const Extrema& here = cell(at);
-    out.segments.push_back({from, world.end, looseness_ * here.maximum.maxCoeff(), here});
+    out.segments.push_back({from, world.end, looseness_ * here.maximum.maxCoeff(), here, diagonal_});
   }
 }
 

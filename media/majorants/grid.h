@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "media/majorants/crossing.h"
 #include "media/registry.h"
 
 namespace nullmark {
@@ -11,9 +12,10 @@ namespace nullmark {
 /// medium's `extrema` sees to that).
 class GridMajorant final : public MajorantStructure {
  public:
-  GridMajorant(const Medium& medium, const std::array<int, 3>& resolution, Real looseness);
+  GridMajorant(const Medium& medium, const std::array<int, 3>& resolution, Real looseness, Crossing crossing = Crossing::carry);
 
   void segments(const Ray& world, const Ray& local, SegmentBuffer& out) const override;
+  StructureSize size() const override { return {cells_.size(), 0, sizeof *this + cells_.size() * sizeof(Extrema)}; }
 
  private:
   const Extrema& cell(const std::array<int, 3>& at) const {
@@ -22,6 +24,7 @@ class GridMajorant final : public MajorantStructure {
 
   std::array<int, 3> resolution_;
   Real looseness_, diagonal_ = 0;
+  Crossing crossing_;
   Box box_;
   std::vector<Extrema> cells_;
 };
@@ -33,17 +36,19 @@ struct GridMajorantSource final : MajorantSource {
 
   int resolution = 16, resolution_y = 0, resolution_z = 0;
   Real looseness = 1;
+  CrossingChoice crossing;
 
   void parameters(ParameterVisitor& visit) override {
     visit.integer("resolution", resolution, 1, 512, "cells along x, and along the other axes where they are not given");
     visit.integer("resolution_y", resolution_y, 0, 512, "cells along y; 0: as along x");
     visit.integer("resolution_z", resolution_z, 0, 512, "cells along z; 0: as along x");
     visit.number("looseness", looseness, Range::positive(), "", "majorant over least bound; below 1 the majorant is violated");
+    crossing.parameters(visit);
   }
   std::unique_ptr<const MajorantStructure> build(std::shared_ptr<const Medium> medium) const override {
     return std::make_unique<GridMajorant>(
         *medium, std::array{resolution, resolution_y ? resolution_y : resolution, resolution_z ? resolution_z : resolution},
-        looseness);
+        looseness, crossing.chosen());
   }
 };
 

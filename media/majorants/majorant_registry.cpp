@@ -1,11 +1,15 @@
 #include "media/majorants/global.h"
 #include "media/majorants/grid.h"
+#include "media/majorants/kd_tree.h"
+#include "media/majorants/octree.h"
 #include "media/majorants/prescribed.h"
 
 namespace nullmark {
 
 NULLMARK_REGISTER_MAJORANT(GlobalMajorantSource);
 NULLMARK_REGISTER_MAJORANT(GridMajorantSource);
+NULLMARK_REGISTER_MAJORANT(KdTreeSource);
+NULLMARK_REGISTER_MAJORANT(OctreeSource);
 NULLMARK_REGISTER_MAJORANT(PrescribedMajorantSource);
 
 }  // namespace nullmark

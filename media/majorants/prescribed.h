@@ -25,11 +25,12 @@ class PrescribedMajorant final : public MajorantStructure {
 
   void segments(const Ray& world, const Ray&, SegmentBuffer& out) const override {
     out.clear();
-    out.cell_diagonal = diagonal_;
     if (!(world.length() > 0)) return;
     const Real rate = value_ + std::max(gradient_.dot(world.at(world.begin)), gradient_.dot(world.at(world.end)));
-    out.segments.push_back({world.begin, world.end, std::max<Real>(0, rate), extinction_});
+    out.segments.push_back({world.begin, world.end, std::max<Real>(0, rate), extinction_, diagonal_});
   }
+
+  StructureSize size() const override { return {1, 0, sizeof *this}; }
 
  private:
   Extrema extinction_;

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <memory>
+
+#include "media/majorants/bound_lattice.h"
+#include "media/registry.h"
+
+namespace nullmark {
+
+/// A cell of a partition, or the plane that cuts it in two.
+struct Partition {
+  std::size_t axis = 0;
+  int plane = 0;  ///< of the lattice
+  std::unique_ptr<Partition> below, above;
+
+  bool is_cell() const { return !below; }
+};
+
+/// Bounds over cells that planes across the axes cut out of the medium's local box, as a binary tree of these planes.  Each cell
+/// holds the extrema inside it, for trilinear volumes over the whole filter footprint.  Rays walk it front to back.
+class TreeMajorant : public MajorantStructure {
+ public:
+  /// Partitions may be this deep.
+  static constexpr int kDeepest = 60;
+
+  void segments(const Ray& world, const Ray& local, SegmentBuffer& out) const final;
+
+  StructureSize size() const final {
+    return {cells_.size(), nodes_.size(), sizeof *this + nodes_.size() * sizeof(Node) + cells_.size() * sizeof(Cell)};
+  }
+
+  /// Lookups of ratio tracking plus crossings from cell to cell, averaged over isotropic uniform lines through the world box:
+  /// (4 sum k_i V_i + 2 sum |planes|) / S, with k_i, V_i a cell's majorant and volume, |planes| the areas of the cuts and S the
+  /// box's surface [Yue et al. 2011].
+  Real expected_cost() const { return cost_; }
+
+ protected:
+  TreeMajorant(const Medium& medium, const BoundLattice& lattice, const Partition& partition, Real looseness, Crossing crossing);
+
+ private:
+  static constexpr std::uint32_t kCell = 3;
+
+  struct Node {
+    Real plane = 0;           // local coordinate
+    std::uint32_t axis = 0;   // kCell: a leaf
+    std::uint32_t first = 0;  // node below the plane, followed by the one above; or index of the cell
+  };
+  struct Cell {
+    Extrema extinction;
+    Real majorant = 0, diagonal = 0;
+  };
+
+  std::vector<Node> nodes_;
+  std::vector<Cell> cells_;
+  Real cost_ = 0;
+  Crossing crossing_;
+};
+
+}  // namespace nullmark
