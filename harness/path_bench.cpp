@@ -59,7 +59,7 @@ class Paths {
       squares += value * value;
     }
     const auto n = static_cast<double>(block_.values.size());
-    return squares / n - sum / n * (sum / n);
+    return std::max(0., squares / n - sum / n * (sum / n));
   }
 
  private:
