@@ -51,6 +51,17 @@ class Paths {
 
   const Counters& counters() const { return counters_; }
 
+  /// Of the samples drawn last.
+  double variance() const {
+    double sum = 0, squares = 0;
+    for (const Real value : block_.values) {
+      sum += value;
+      squares += value * value;
+    }
+    const auto n = static_cast<double>(block_.values.size());
+    return std::max(0., squares / n - sum / n * (sum / n));
+  }
+
  private:
   TransportScene scene_;
   std::unique_ptr<const Kernel> kernel_;
@@ -63,17 +74,17 @@ class Paths {
 void add(const std::string& group, const char* kernel, const Effects& effects, bool general) {
   const TransportScene scene = scene_with(effects);
   Paths first(scene, general);
-  first.draw(4096);
+  first.draw(16384);
   const Counters& cost = first.counters();
   const auto per_path = [&](std::uint64_t n) { return static_cast<double>(n) / static_cast<double>(cost.samples); };
-  benchmark::RegisterBenchmark(
-      fmt::format("radiance, {}/{}, {:.2f} lookups, {:.2f} draws", group, kernel, per_path(cost.lookups), per_path(cost.draws))
-          .c_str(),
-      [=](benchmark::State& state) {
-        Paths paths(scene, general);
-        for ([[maybe_unused]] auto _ : state) paths.draw(256);
-        state.counters["items"] = static_cast<double>(paths.counters().samples);
-      });
+  benchmark::RegisterBenchmark(fmt::format("radiance, {}/{}, {:.2f} lookups, {:.2f} draws, variance {:.2f}", group, kernel,
+                                           per_path(cost.lookups), per_path(cost.draws), first.variance())
+                                   .c_str(),
+                               [=](benchmark::State& state) {
+                                 Paths paths(scene, general);
+                                 for ([[maybe_unused]] auto _ : state) paths.draw(256);
+                                 state.counters["items"] = static_cast<double>(paths.counters().samples);
+                               });
 }
 
 [[maybe_unused]] const bool kRegistered = [] {

@@ -1,5 +1,5 @@
 // Oracles of radiance: furnaces, closed forms, quadrature, reciprocity.  Means are compared within 5 standard errors (6e-7 a
-// test, two-sided normal; about 200 tests, so 1e-4 for the file at fixed seeds), the error being the samples' own.
+// comparison, two-sided normal; about 700 of them, so 4e-4 for the file, at fixed seeds), the error being the samples' own.
 
 #include "harness/path_kernel.h"
 
