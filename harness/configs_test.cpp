@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
 
+#include "estimators/transport/phase.h"
 #include "harness/config.h"
+#include "harness/expectation.h"
 #include "harness/run.h"
 #include "harness/scene.h"
 
@@ -36,6 +39,58 @@ TEST(Configs, AllOfThemExpand) {
       const Plan plan = shipped(entry.path().filename().string());
       EXPECT_FALSE(plan.cells.empty()) << entry.path();
     }
+}
+
+/// T + int_0^1 mu_s(z) T(0,z) [int_0^1 p(c) e^{-tau(z,1)/c} dc + int_0^1 p(-c) e^{-tau(0,z)/c} dc] dz for mu = k (b + (e - b) z)
+/// under radiance 1 from everywhere, p the Henyey-Greenstein density of the cosine.
+Real slab_radiance(Real k, Real albedo, Real g) {
+  using Rule = boost::math::quadrature::gauss_kronrod<Real, 61>;
+  const auto extinction = [&](Real z) { return k * (0.2 + 2.8 * z); };
+  const auto depth = [&](Real z) { return k * (0.2 * z + 1.4 * z * z); };
+  const auto density = [&](Real c) { return (1 - g * g) / (2 * std::pow(1 + g * g - 2 * g * c, 1.5)); };
+  const auto towards = [&](Real tau, int side) {
+    return Rule::integrate([&](Real c) { return density(side * c) * std::exp(-tau / c); }, 0., 1., 12, 1e-11);
+  };
+  const Real scattered = Rule::integrate(
+      [&](Real z) {
+        return albedo * extinction(z) * std::exp(-depth(z)) * (towards(depth(1) - depth(z), 1) + towards(depth(z), -1));
+      },
+      0., 1., 8, 1e-10);
+  return std::exp(-depth(1)) + scattered;
+}
+
+/// The numbers that slab.json gives as references are what Boost's quadrature makes of the integral.
+TEST(Configs, SlabReferencesAreQuadratures) {
+  const Plan plan = shipped("slab.json");
+  std::map<std::vector<Real>, int> seen;
+  for (const Cell& cell : plan.cells) {
+    ASSERT_TRUE(cell.reference) << cell.name;
+    const MediumSpec& medium = plan.media[cell.medium];
+    ASSERT_EQ(medium.field.type, "linear");
+    if (seen[cell.reference->value]++ > 0) continue;
+    for (std::size_t c = 0; c < cell.reference->value.size(); ++c) {
+      const Real k = medium.spectrum.empty() ? 1 : medium.spectrum[c];
+      EXPECT_NEAR(cell.reference->value[c] / slab_radiance(k, medium.albedo[0], medium.anisotropy), 1, 1e-7) << cell.name;
+    }
+  }
+  EXPECT_EQ(seen.size(), 4u);
+}
+
+/// Relations of decomposition tracking: the numbers that the tables expect, at fixed seeds.
+TEST(Configs, Seed003RelationsAreMet) {
+  for (const char* name : {"seed_003_decomposition.json", "seed_003_optimal.json"}) {
+    Plan plan = shipped(name);
+    RunRecord record;
+    for (Cell& cell : plan.cells) cell.gate.enabled = false;
+    record.cells = run(plan);
+    record.tables = plan.tables;
+    const std::vector<Expectation> all = expectations(record);
+    EXPECT_GE(all.size(), 15u);
+    for (const Expectation& one : all) EXPECT_TRUE(one.met) << expectation_line(one);
+    // An expectation that is off by more than its tolerance is seen.
+    record.tables[0].rows[0].given[0].second *= 1 + 3 * *record.tables[0].rows[0].tolerance;
+    EXPECT_FALSE(expectations(record)[0].met);
+  }
 }
 
 /// Kozelj's Table 1: corrected within 2 % of theory at 256 x 256, as published within 4 % of the printed values at 400 x 400.

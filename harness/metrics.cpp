@@ -58,7 +58,8 @@ const std::vector<std::string>& metric_names() {
                                                   "lookups_per_sample",
                                                   "weight_mean",
                                                   "weight_variance",
-                                                  "weighted_cost"};
+                                                  "weighted_cost",
+                                                  "draws_per_sample"};
   return kNames;
 }
 
@@ -73,6 +74,7 @@ std::optional<Real> metric(const CellRecord& record, std::string_view name) {
   if (name == "weight_mean") return weight(record, &ChannelRecord::mean);
   if (name == "weight_variance") return weight(record, &ChannelRecord::variance);
   if (name == "weighted_cost") return weighted_cost(record.lookups_per_sample, weight(record, &ChannelRecord::variance));
+  if (name == "draws_per_sample") return record.draws_per_sample;
   if (name == "ns_per_sample" && record.time) return record.time->ns_per_sample;
   if (name == "ns_per_lookup" && record.time) return record.time->ns_per_lookup;
   return std::nullopt;
