@@ -523,6 +523,7 @@ TEST(PathScattering, EveryHonestSamplerMeetsSingleScattering) {
       ++walked;
     }
   }
+  RecordProperty("walked", walked);
   EXPECT_GE(walked, 1);
 }
 
