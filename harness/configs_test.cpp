@@ -80,6 +80,71 @@ TEST(Configs, Seed000ResidualsHaveTheirExpectation) {
   }
 }
 
+/// C20: lookups are 1 - mu_c/mub of delta tracking's below the minorant, min mu = 1, mub = 3; beyond it the variance grows.
+TEST(Configs, Seed003DecompositionLooksUpWhatTheMajorantLeavesOverTheControl) {
+  const auto records = run(shipped("seed_003_decomposition.json"));
+  const CellRecord& delta = find(records, "relative_cost", "delta");
+  Real variance = 0;
+  int compared = 0;
+  for (const CellRecord& record : records) {
+    SCOPED_TRACE(record.cell.name);
+    ASSERT_EQ(record.status, Status::ok) << record.reason;
+    EXPECT_NEAR(*record.lookups_per_sample / *record.lookups_theory, 1, 0.01);
+    const ChannelRecord& channel = record.channel[0];
+    if (*channel.relative_variance < 100) {
+      EXPECT_LT(std::abs(*channel.bias), 5.5 * std::sqrt(*channel.variance_theory / static_cast<Real>(record.samples)));
+    }
+    if (record.cell.experiment == "beyond_the_minorant") {
+      EXPECT_GT(*channel.variance_theory, variance);
+      variance = *channel.variance_theory;
+    }
+    if (record.cell.experiment != "relative_cost" || &record == &delta) continue;
+    const ParameterValues& values = record.cell.estimator.values;
+    const bool given = std::get<std::string>(values.at("control")) == "given";
+    Real control = 0;
+    if (record.cell.estimator.type == "analog_decomposition") {
+      control = std::get<Real>(values.at(given ? "value" : "factor"));
+    } else if (given) {
+      for (const Real one : std::get<std::vector<Real>>(values.at("controls"))) control += one;
+    } else {
+      control = 1;
+    }
+    EXPECT_NEAR(*record.lookups_theory / *delta.lookups_theory, 1 - control / 3, 1e-9);
+    EXPECT_NEAR(*channel.variance_theory, *delta.channel[0].variance_theory, 1e-12);
+    ++compared;
+  }
+  EXPECT_EQ(compared, 9);
+}
+
+/// C24: history-aware schemes beat the others; those that do not depend on the albedo have the tabled variances.
+TEST(Configs, Seed003SpectralRanksTheSchemes) {
+  const auto records = run(shipped("seed_003_spectral.json"));
+  std::map<std::string, const CellRecord*> constant;
+  for (const CellRecord& record : records) {
+    SCOPED_TRACE(record.cell.name);
+    ASSERT_EQ(record.status, Status::ok) << record.reason;
+    if (record.lookups_theory) {
+      EXPECT_NEAR(*record.lookups_per_sample / *record.lookups_theory, 1, 0.01);
+    }
+    for (const ChannelRecord& channel : record.channel)
+      if (channel.variance_theory) {
+        EXPECT_LT(std::abs(*channel.bias), 5.5 * std::sqrt(*channel.variance_theory / static_cast<Real>(record.samples)));
+      }
+    if (record.cell.experiment == "constant") constant[record.cell.estimator.label] = &record;
+  }
+  const auto variance = [&](const std::string& label, std::size_t channel) {
+    return *constant.at(label)->channel[channel].variance_theory;
+  };
+  const std::string history = "spectral", average = "spectral/scheme:average";
+  EXPECT_NEAR(variance(average, 0), 1.31605, 6e-6);
+  EXPECT_NEAR(variance(history, 0), .396968, 1e-6);
+  EXPECT_NEAR(variance(history, 1), .098865, 1e-6);
+  EXPECT_NEAR(variance(history, 2), .013616, 1e-6);
+  for (const std::size_t c : {0u, 1u, 2u}) EXPECT_NEAR(variance("hero_wavelength", c), variance(history, c), 1e-12);
+  EXPECT_LT(variance("spectral/scheme:history_aware_maximum", 0), variance("spectral/scheme:maximum", 0));
+  EXPECT_NEAR(*constant.at(history)->lookups_theory, 1.66547, 6e-6);
+}
+
 class RealVolumes : public testing::Test {
  protected:
   void SetUp() override {
