@@ -1,5 +1,7 @@
 #pragma once
 
+#include <numeric>
+
 #include "estimators/estimator.h"
 #include "estimators/event_choice.h"
 
@@ -114,20 +116,22 @@ struct HeroWavelengthTracking {
     constexpr Real kDeepest = 1e5;
     if (profile.nodes(c).empty() || !(depth > 0)) return 0;
     if (depth > kDeepest) return std::nullopt;
-    Value ratio = ray.value(0);
+    const auto channels = static_cast<std::size_t>(ray.channels);
+    std::vector<Real> ratio, chance(channels, 1);  // a and a^k
     for (int l = 0; l < ray.channels; ++l) {
       const RayProfile::Node& at = profile.nodes(l)[0];
       const Real mub = ray.majorant.rate(at.piece);
-      channel(ratio, l) = (mub - std::min(at.extinction, mub)) / mub;
+      ratio.push_back((mub - std::min(at.extinction, mub)) / mub);
     }
-    const Real own = channel(ratio, c), mean = std::exp(-(1 - own) * depth);
-    Value chance = ray.value(1);  // a^k
+    const auto own = static_cast<std::size_t>(c);
+    const Real mean = std::exp(-(1 - ratio[own]) * depth), last = depth + 12 * std::sqrt(depth) + 40;
     Real second = 0;
-    const Real last = depth + 12 * std::sqrt(depth) + 40;
-    for (Real k = 0; k < last && average(chance) > 0; ++k) {
-      second +=
-          std::exp(k * std::log(depth) - depth - std::lgamma(k + 1)) * channel(chance, c) * channel(chance, c) / average(chance);
-      chance *= ratio;
+    for (Real k = 0; k < last; ++k) {
+      const Real sum = std::accumulate(chance.begin(), chance.end(), Real{0});
+      if (!(sum > 0)) break;
+      const Real poisson = std::exp(k * std::log(depth) - depth - std::lgamma(k + 1));
+      second += poisson * chance[own] * chance[own] * static_cast<Real>(ray.channels) / sum;
+      for (std::size_t l = 0; l < channels; ++l) chance[l] *= ratio[l];
     }
     return std::max<Real>(0, second - mean * mean);
   }

@@ -45,8 +45,8 @@ TEST(Configs, AllOfThemExpand) {
 /// under radiance 1 from everywhere, p the Henyey-Greenstein density of the cosine.
 Real slab_radiance(Real k, Real albedo, Real g) {
   using Rule = boost::math::quadrature::gauss_kronrod<Real, 61>;
-  const auto extinction = [&](Real z) { return k * (0.2 + 2.8 * z); };
-  const auto depth = [&](Real z) { return k * (0.2 * z + 1.4 * z * z); };
+  const auto extinction = [&](Real z) { return k * (0.1 + 0.9 * z); };
+  const auto depth = [&](Real z) { return k * (0.1 * z + 0.45 * z * z); };
   const auto density = [&](Real c) { return (1 - g * g) / (2 * std::pow(1 + g * g - 2 * g * c, 1.5)); };
   const auto towards = [&](Real tau, int side) {
     return Rule::integrate([&](Real c) { return density(side * c) * std::exp(-tau / c); }, 0., 1., 12, 1e-11);
@@ -162,6 +162,35 @@ TEST(Configs, Seed000TreesLeaveHomogeneousMediaAlone) {
     EXPECT_EQ(record.channel[0].mean, one.channel[0].mean) << record.cell.name;
   }
   EXPECT_EQ(trees, 4 * 6);
+}
+
+/// C24: history-aware schemes beat the others; those that do not depend on the albedo have the tabled variances.
+TEST(Configs, Seed003SpectralRanksTheSchemes) {
+  const auto records = run(shipped("seed_003_spectral.json"));
+  std::map<std::string, const CellRecord*> constant;
+  for (const CellRecord& record : records) {
+    SCOPED_TRACE(record.cell.name);
+    ASSERT_EQ(record.status, Status::ok) << record.reason;
+    if (record.lookups_theory) {
+      EXPECT_NEAR(*record.lookups_per_sample / *record.lookups_theory, 1, 0.01);
+    }
+    for (const ChannelRecord& channel : record.channel)
+      if (channel.variance_theory) {
+        EXPECT_LT(std::abs(*channel.bias), 5.5 * std::sqrt(*channel.variance_theory / static_cast<Real>(record.samples)));
+      }
+    if (record.cell.experiment == "constant") constant[record.cell.estimator.label] = &record;
+  }
+  const auto variance = [&](const std::string& label, std::size_t channel) {
+    return *constant.at(label)->channel[channel].variance_theory;
+  };
+  const std::string history = "spectral", average = "spectral/scheme:average";
+  EXPECT_NEAR(variance(average, 0), 1.31605, 6e-6);
+  EXPECT_NEAR(variance(history, 0), .396968, 1e-6);
+  EXPECT_NEAR(variance(history, 1), .098865, 1e-6);
+  EXPECT_NEAR(variance(history, 2), .013616, 1e-6);
+  for (const std::size_t c : {0u, 1u, 2u}) EXPECT_NEAR(variance("hero_wavelength", c), variance(history, c), 1e-12);
+  EXPECT_LT(variance("spectral/scheme:history_aware_maximum", 0), variance("spectral/scheme:maximum", 0));
+  EXPECT_NEAR(*constant.at(history)->lookups_theory, 1.66547, 6e-6);
 }
 
 class RealVolumes : public testing::Test {

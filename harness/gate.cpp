@@ -33,16 +33,23 @@ Real default_epsilon(Real transmittance) {
   return transmittance > 1e-4 ? 0.05 : 0.5;
 }
 
-/// Absolute margin of the scores of a free path, where they are rare.
-constexpr Real kRareScore = 1e-4;
+/// Absolute margin of the scores of a free path, of all flights, and the least of it.
+constexpr Real kOfFlights = 2e-3, kRareScore = 1e-4;
+
+/// Smaller where a score is rare, or nearly always given, or a tracker that never scores it would pass.  A weight's mean is 1.
+Real score_epsilon(const Cell& cell, Real mean) {
+  constexpr Real kOfScore = 0.25, kNever = 1e-9;
+  const Real margin = cell.gate.epsilon.value_or(kOfFlights), rare = std::min(mean, 1 - mean);
+  return rare < kNever ? margin : std::max(std::min(margin, kOfScore * rare), kRareScore);
+}
 
 /// Absolute margin of an output.  Where hardly anything is absorbed it shrinks with 1 - T, or a tracker that sees no medium at
 /// all would pass.
 Real absolute_epsilon(const Cell& cell, Real mean) {
+  if (cell.quantity == Quantity::free_path) return score_epsilon(cell, mean);
   if (cell.gate.epsilon) return *cell.gate.epsilon * mean;
   if (cell.quantity == Quantity::optical_depth || cell.quantity == Quantity::radiance) return 0.01 * std::abs(mean);
   const Real margin = default_epsilon(mean) * mean, absorbed = 1 - mean;
-  if (cell.quantity == Quantity::free_path) return std::max(margin, kRareScore);
   constexpr Real kOfAbsorbed = 0.1;
   return absorbed > 1e-12 ? std::min(margin, kOfAbsorbed * absorbed) : margin;
 }

@@ -85,7 +85,7 @@ class RadianceKernel : public Kernel {
   bool needs_optical_depth() const override { return false; }
   bool needs_knots() const override { return false; }
   bool states_theory() const override { return false; }
-  bool answers(Quantity) const override { return true; }  // asked for radiance alone
+  bool answers(Quantity quantity) const override { return quantity == Quantity::radiance; }
   std::size_t outputs(Quantity, const RayContext&) const override { return static_cast<std::size_t>(channels_); }
   bool flies() const override { return false; }
   bool states_count_law() const override { return false; }
