@@ -116,6 +116,28 @@ struct NullCollisionTracking {
     return theory;
   }
 
+  /// E[w^2; collision] = int sum_k mu_k^2/(mub P_k) K dx over absorption and scattering.
+  Theory weight_theory(const Ray& ray, const RayProfile& smooth, int c) const {
+    const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
+    std::vector<Real> growth, collisions;
+    for (std::size_t j = 0; j < profile.nodes(c).size(); ++j) {
+      const Real mub = ray.majorant.rate(profile.nodes(c)[j].piece);
+      Value extinction = ray.value(0);
+      for (int l = 0; l < ray.channels; ++l) channel(extinction, l) = profile.nodes(l)[j].extinction;
+      const Coefficients<Value> mu(extinction, ray.albedo, mub);
+      const Chances chance = mub > 0 ? chances(ray, mu) : Chances{0, 0, 0};
+      const auto second = [&](EventKind kind) {
+        const Real own = channel(mu.of(kind), c), p = chance.of(kind);
+        return p > 0 ? own * own / (mub * p) : 0;
+      };
+      growth.push_back(second(EventKind::escape) - mub);
+      collisions.push_back(second(EventKind::absorb) + second(EventKind::scatter));
+    }
+    Theory theory = this->theory(ray, smooth, c, Quantity::free_path);
+    theory.variance = weight_variance(profile, c, growth, collisions);
+    return theory;
+  }
+
  private:
   struct Chances {
     Real absorb, scatter, null;  ///< of each event in all

@@ -125,6 +125,17 @@ struct SpectralTracking {
     return theory;
   }
 
+  /// On grey media all weights are 1 where the rate bounds.
+  Theory weight_theory(const Ray& ray, const RayProfile& profile, int c) const {
+    Theory theory = this->theory(ray, profile, c, Quantity::free_path);
+    theory.mean = theory.variance = {};
+    if (ray.channels > 1) return theory;
+    for (const RayProfile::Node& at : profile.nodes(0))
+      if (at.extinction > ray.majorant.rate(at.piece)) return theory;
+    theory.variance = 0;
+    return theory;
+  }
+
  private:
   /// R_k of the scheme.
   static Real measure(const Ray& ray, const Value& weight, const Value& coefficient) {

@@ -284,8 +284,7 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
     verdict.laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range,
                              prepared.theory, {}, stop);
   // Bins are coarse; where weights are 1 the distribution itself can be looked at.
-  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path &&
-      prepared.range == SampleRange::binary && prepared.scene->bounding)
+  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path && prepared.theory.unit_weights)
     for (const LawRecord& law : free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, {}, stop))
       verdict.laws.push_back(law);
   verdict.alpha = levels.alpha;

@@ -350,7 +350,15 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<The
     const std::size_t outputs = targets.outputs;
     const bool one_per_channel = targets.names.empty();
     // Scores that are 0 or 1 have the variance of a coin; a free path's last output is its weight.
-    const bool coins = !one_per_channel && queries[k].range == SampleRange::binary && scene.bounding;
+    bool coins = !one_per_channel && queries[k].range == SampleRange::binary && scene.bounding;
+    if (queries[k].quantity == Quantity::free_path) {
+      bool always_one = true;
+      for (std::size_t i = 0; i < rays * channels && always_one; ++i) {
+        const Theory& theory = all[(i / channels * count + k) * channels + i % channels];
+        always_one = theory.variance && *theory.variance == 0;
+      }
+      coins = cell.unit_weights = coins || always_one;
+    }
     bool all_variances = true, all_lookups = true, all_spreads = true;
     cell.ray_shift.assign(rays * outputs, 0);
     cell.ray_variance.resize(rays * outputs);

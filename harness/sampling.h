@@ -45,6 +45,7 @@ struct CellTheory {
   std::vector<std::optional<Real>> squared_bias;  ///< per output, mean over rays of (mean - reference)^2
   std::vector<std::optional<Real>> bias;
   std::optional<Real> lookups;  ///< averaged over rays
+  bool unit_weights = false;    ///< of a free path: its weight is always 1
   /// Per ray and output; empty where not known for all.  Variance of a sample; the estimator's own mean minus the target.
   std::vector<Real> ray_variance, ray_shift;
   std::vector<Real> ray_lookups, ray_lookups_variance;  ///< per ray; empty where not known for all
