@@ -1,6 +1,7 @@
 #pragma once
 
 #include "estimators/estimator.h"
+#include "estimators/kinks.h"
 #include "estimators/survival.h"
 
 namespace nullmark {
@@ -91,7 +92,8 @@ struct AnalogDecompositionTracking {
   int real_collisions(const Walk& walk, const Ray&) const { return walk.looked_up; }
 
   /// Where the rate is violated every residual collision is accepted: the walk sees mu_c + min(mu - mu_c, mubr).
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const Ray& ray, const RayProfile& smooth, int c, Quantity) const {
+    const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
     std::vector<Real> rate, through, alive;
     for (const RayProfile::Node& at : profile.nodes(c)) {
       rate.push_back(ray.residual.rate(at.piece));

@@ -4,6 +4,7 @@
 
 #include "estimators/estimator.h"
 #include "estimators/event_choice.h"
+#include "estimators/kinks.h"
 
 namespace nullmark {
 
@@ -70,7 +71,8 @@ struct HeroWavelengthTracking {
   int real_collisions(const Walk& walk, const Passage<Value>&) const { return walk.kind != EventKind::escape; }
 
   /// Where the majorant is violated the walk sees min(mu, mub).
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const Passage<Value>& ray, const RayProfile& smooth, int c, Quantity) const {
+    const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
     Theory theory;
     if (!ray.draws_absorption) return theory;
     std::vector<Real> rate, alive;

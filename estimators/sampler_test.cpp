@@ -210,6 +210,19 @@ TEST(Sampler, GreyTrackersKeepTheLawOfFreePaths) {
   });
 }
 
+/// Those that need a bound see min(mu, mub) without one, and say so.
+TEST(Sampler, TheoryHoldsWhereTheMajorantIsViolated) {
+  for (const Real looseness : {0.6, 0.8}) {
+    const HandWalked<AnalogDecompositionTracking> analog({}, linear(0.5, 1.5), 1, looseness);
+    EXPECT_GT(*analog.theory().mean, 1.02 * analog.transmittance(1));
+    expect_theory(analog);
+    const HandWalked<HeroWavelengthTracking, Spectrum> hero(
+        {}, std::make_shared<Spectral>(linear(0.5, 1.5), std::vector<Real>{1, 0.5}), 1, looseness);
+    EXPECT_GT(*hero.theory(0).mean, 1.02 * hero.transmittance(1)[0]);
+    expect_theory(hero);
+  }
+}
+
 TEST(Sampler, RegularInversionKeepsTheLawOfFreePaths) {
   Polynomial cubic;
   cubic.profile.coefficients = {1, -1, 0.5, 0.2};

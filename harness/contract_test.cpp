@@ -211,8 +211,7 @@ TEST(Contract, ViolatedMajorantsAreCounted) {
 TEST(Contract, TheoryHoldsWhereTheMajorantIsViolated) {
   const auto records = run(
       R"("rays":{"type":"single","from":[0,0.5,0.5],"to":[1,0.5,0.5]},"samples_per_ray":400000,
-          "matrix":{"estimator":["delta",{"type":"next_flight_delta","variant":["a","b"]},"residual_delta","ratio","analog_decomposition",
-                                 "hero_wavelength"],
+          "matrix":{"estimator":["delta",{"type":"next_flight_delta","variant":["a","b"]},"residual_delta","ratio","hero_wavelength"],
                     "medium":[{"type":"linear","begin":0.5,"end":1},{"type":"homogeneous","extinction":1.5}],
                     "majorant":[{"type":"global","looseness":0.6}]})");
   for (const CellRecord& record : records) {

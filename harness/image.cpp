@@ -1,5 +1,9 @@
 #include "harness/image.h"
 
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfOutputFile.h>
 #include <spng.h>
 
 #include <cmath>
@@ -9,17 +13,24 @@
 #include <stdexcept>
 
 namespace nullmark {
+namespace {
 
-void write_png(const std::string& path, int width, int height, int channels, const std::vector<Real>& values, Real maximum) {
+Real encoded(Real linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055; }
+
+}  // namespace
+
+void write_png(const std::string& path, int width, int height, int channels, const std::vector<Real>& values, Real maximum,
+               bool display) {
   const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height), n = static_cast<std::size_t>(channels);
   std::vector<std::uint8_t> pixels(w * h * 3);
   for (std::size_t y = 0; y < h; ++y)
     for (std::size_t x = 0; x < w; ++x)
       for (std::size_t c = 0; c < 3; ++c) {
         const Real value = values[((h - 1 - y) * w + x) * n + (n == 3 ? c : 0)] / maximum;
-        pixels[(y * w + x) * 3 + c] =
-            !std::isfinite(value) ? (c == 1 ? 0 : 255)
-                                  : static_cast<std::uint8_t>(std::lround(255 * std::min<Real>(1, std::max<Real>(0, value))));
+        const Real shown = std::min<Real>(1, std::max<Real>(0, value));
+        pixels[(y * w + x) * 3 + c] = !std::isfinite(value)
+                                          ? (c == 1 ? 0 : 255)
+                                          : static_cast<std::uint8_t>(std::lround(255 * (display ? encoded(shown) : shown)));
       }
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"), &std::fclose);
   if (!file) throw std::runtime_error(path + ": cannot be written");
@@ -29,6 +40,27 @@ void write_png(const std::string& path, int width, int height, int channels, con
   spng_set_ihdr(context.get(), &header);
   if (const int error = spng_encode_image(context.get(), pixels.data(), pixels.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE))
     throw std::runtime_error(path + ": " + spng_strerror(error));
+}
+
+void write_exr(const std::string& path, int width, int height, const std::vector<Layer>& layers) {
+  Imf::Header header(width, height);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  Imf::FrameBuffer frame;
+  const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
+  std::vector<std::vector<float>> pixels;
+  for (const Layer& layer : layers) {
+    pixels.emplace_back(w * h);
+    for (std::size_t y = 0; y < h; ++y)
+      for (std::size_t x = 0; x < w; ++x) pixels.back()[y * w + x] = static_cast<float>(layer.values[(h - 1 - y) * w + x]);
+  }
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    header.channels().insert(layers[i].name, Imf::Channel(Imf::FLOAT));
+    frame.insert(layers[i].name,
+                 Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(pixels[i].data()), sizeof(float), w * sizeof(float)));
+  }
+  Imf::OutputFile file(path.c_str(), header);
+  file.setFrameBuffer(frame);
+  file.writePixels(height);
 }
 
 }  // namespace nullmark

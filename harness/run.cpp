@@ -446,6 +446,28 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
   }
 }
 
+/// What a cell's pixels hold, unrounded but for single precision: mean, reference and variance per channel, and lookups.
+std::vector<Layer> layers(const PreparedCell& prepared, const Sampled& sampled) {
+  const std::size_t outputs = prepared.targets.outputs, rays = prepared.scene->rays->world.size();
+  std::vector<Layer> all;
+  const auto add = [&](const std::string& name, auto value) {
+    all.push_back({name, std::vector<Real>(rays)});
+    for (std::size_t ray = 0; ray < rays; ++ray) all.back().values[ray] = value(ray);
+  };
+  for (std::size_t o = 0; o < outputs; ++o) {
+    const auto truth = [&](std::size_t ray) {
+      return measured(prepared.targets.mean[ray * outputs + o], prepared.cell->measurement);
+    };
+    const auto moments = [&](std::size_t ray) -> const Moments& { return sampled.moments[ray * outputs + o]; };
+    add(fmt::format("mean.{}", o), [&](std::size_t ray) { return truth(ray) + moments(ray).mean(); });
+    if (prepared.targets.known) add(fmt::format("reference.{}", o), truth);
+    add(fmt::format("variance.{}", o), [&](std::size_t ray) { return moments(ray).variance(); });
+  }
+  add("lookups",
+      [&](std::size_t ray) { return static_cast<Real>(sampled.lookups[ray]) / static_cast<Real>(prepared.samples_per_ray); });
+  return all;
+}
+
 void write_images(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled, const RunOptions& options,
                   const RunObserver& observer) {
   const BuiltRays& rays = *prepared.scene->rays;
@@ -471,13 +493,17 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
     const auto write = [&](const char* kind, const std::vector<Real>& values, std::size_t count, Real maximum) {
       const std::string file = fmt::format("{}.{}.png", prepared.cell->id, kind);
       write_png((std::filesystem::path(options.image_directory) / file).string(), rays.width, rays.height,
-                static_cast<int>(count), values, maximum);
+                static_cast<int>(count), values, maximum, prepared.cell->quantity == Quantity::radiance && &values == &mean);
       record.images[kind] = (std::filesystem::path(options.image_prefix) / file).string();
     };
     write("mean", mean, shown, prepared.cell->image_maximum);
-    write("reference", reference, shown, prepared.cell->image_maximum);
+    if (prepared.targets.known) write("reference", reference, shown, prepared.cell->image_maximum);
     write("variance", variance, shown, greatest(variance));
     write("lookups", lookups, 1, greatest(lookups));
+    const std::string file = fmt::format("{}.exr", prepared.cell->id);
+    write_exr((std::filesystem::path(options.image_directory) / file).string(), rays.width, rays.height,
+              layers(prepared, sampled));
+    record.images["layers"] = (std::filesystem::path(options.image_prefix) / file).string();
   } catch (const std::exception& error) {
     observer.warning(error.what());
   }

@@ -58,7 +58,8 @@ Line channel_line(const CellRecord& record, std::size_t c) {
   const ChannelRecord& channel = record.channel[c];
   const bool first = c == 0;
   const auto once = [&](const std::optional<Real>& number) { return first ? short_number(number) : std::string(); };
-  return {first ? record.cell.estimator.label + (record.outputs.empty() ? "" : ", " + record.outputs[0]) : "  " + output_name(record, c),
+  return {first ? record.cell.estimator.label + (record.outputs.empty() ? "" : ", " + record.outputs[0])
+                : "  " + output_name(record, c),
           shown(channel, channel.rmse, channel.rmse_theory),
           short_number(channel.bias),
           shown(channel, channel.variance, channel.variance_theory),
