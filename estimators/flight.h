@@ -15,12 +15,14 @@ class Rates {
     pieces_.clear();
     begin_ = begin;
     crossing_ = crossing;
+    total_depth_ = 0;
   }
 
   /// Appends the piece from the current end to `end`.  Zero rates are fine, also over an infinite length.
   void append(Real end, Real rate) {
-    const Real from = this->end(), before = total_depth();
-    pieces_.push_back({from, end, rate, 1 / rate, before, rate > 0 ? before + rate * (end - from) : before});
+    const Real from = this->end(), before = total_depth_;
+    if (rate > 0) total_depth_ += rate * (end - from);
+    pieces_.push_back({from, end, rate, 1 / rate, before, total_depth_});
   }
 
   std::size_t size() const { return pieces_.size(); }
@@ -31,7 +33,7 @@ class Rates {
   Real rate(std::size_t i) const { return pieces_[i].rate; }
   Real depth_before(std::size_t i) const { return pieces_[i].depth_before; }
   Real depth_after(std::size_t i) const { return pieces_[i].depth_after; }
-  Real total_depth() const { return pieces_.empty() ? 0 : pieces_.back().depth_after; }
+  Real total_depth() const { return total_depth_; }
 
   /// Distance at which the depth, within piece i, is reached.
   Real position(std::size_t i, Real depth) const {
@@ -44,14 +46,14 @@ class Rates {
     Real begin, end, rate, inverse_rate, depth_before, depth_after;
   };
   std::vector<Piece> pieces_;
-  Real begin_ = 0;
+  Real begin_ = 0, total_depth_ = 0;
   Crossing crossing_ = Crossing::carry;
 };
 
 /// Where a walk is on its ray.  Flights live in majorant depth: the next tentative collision lies one unit exponential of depth
 /// ahead, whatever cells are crossed, so a collision costs one logarithm and a crossing none.  With Crossing::rewind the flight
 /// is cut at each cell's end and starts anew there; the depth it is cut at is where the next exponential counts from, so depths
-/// follow the same law.  Cells of rate 0 are passed over, without a draw.
+/// follow the same law.  Cells of rate 0 are passed over without a draw; a ray that has no other costs one.
 class Flight {
  public:
   void start(const Rates& rates) {
@@ -63,9 +65,15 @@ class Flight {
 
   /// Moves to the next tentative collision; false when it lies beyond the ray's end.
   bool next(auto& rng) {
-    if (rates_->crossing() == Crossing::rewind) [[unlikely]]
-      return next_rewinding(rng);
-    return advance_to(depth_ + rng.exponential());
+    const Real depth = depth_ + rng.exponential();
+    // Most flights stay in their cell: only those that leave it ask for the rule.
+    if (depth < rates_->total_depth() && depth < rates_->depth_after(piece_)) {
+      depth_ = depth;
+      position_ = rates_->position(piece_, depth);
+      return true;
+    }
+    if (rates_->crossing() == Crossing::rewind) return rewind(depth, rng);
+    return advance_to(depth);
   }
 
   /// Moves forwards to the point of the given depth; false (and the ray's end) when the ray is not that deep.
@@ -92,13 +100,15 @@ class Flight {
   Real depth_left() const { return rates_->total_depth() - depth_; }
 
  private:
-  [[gnu::noinline]] bool next_rewinding(auto& rng) {
-    for (; piece_ < rates_->size(); ++piece_) {
-      const Real cell_end = rates_->depth_after(piece_);
-      if (!(depth_ < cell_end)) continue;
-      const Real depth = depth_ + rng.exponential();
-      if (depth < cell_end) return advance_to(depth);
-      depth_ = cell_end;
+  /// Cuts a flight to `depth` at the end of its cell, and others after it, until one ends inside its cell or the ray is left.
+  [[gnu::noinline]] bool rewind(Real depth, auto& rng) {
+    for (;;) {
+      while (piece_ < rates_->size() && !(depth_ < rates_->depth_after(piece_))) ++piece_;
+      if (piece_ == rates_->size()) break;
+      if (depth < rates_->depth_after(piece_)) return advance_to(depth);
+      depth_ = rates_->depth_after(piece_);
+      if (!(depth_ < rates_->total_depth())) break;
+      depth = depth_ + rng.exponential();
     }
     position_ = rates_->end();
     return false;

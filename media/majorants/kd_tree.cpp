@@ -22,7 +22,8 @@ Subtree cut(const BoundLattice& lattice, const Block& block, const KdTreeOptions
   Subtree result;
   const KdCut best = best_kd_cut(lattice, block, looseness, options.crossing_cost);
   result.cost = best.uncut;
-  const bool forced = depth<options.forced_depth, gains = best.gain> 0;
+  const bool forced = depth < options.forced_depth;
+  const bool gains = best.gain > 0;
   if (depth >= options.max_depth || best.gain == -kInfinity || !(gains || forced || patience > 0)) return result;
   const int left = gains || forced ? options.lookahead : patience - 1;
   Subtree below, above;

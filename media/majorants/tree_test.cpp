@@ -57,10 +57,10 @@ MediumPointer noise(Real peak) {
   return made(field);
 }
 
-MediumPointer board(Real extinction) {
+MediumPointer board(Real extinction, const std::array<int, 3>& cells = {3, 3, 3}) {
   Checkerboard field;
   field.even = extinction;
-  field.cells = {3, 3, 3};
+  field.cells = cells;
   return made(field);
 }
 
@@ -77,11 +77,13 @@ Affine sheared() {
   return map;
 }
 
+/// The second checkerboard jumps at planes of the lattice that `trees` has of 13 x 7 x 2 cells: segments end on either side.
 std::vector<MediumPointer> media() {
   return {made(Linear{}),
           bump(60),
           noise(200),
           board(50),
+          board(2, {13, 7, 2}),
           std::make_shared<Placed>(noise(60), sheared()),
           std::make_shared<Spectral>(noise(80), std::vector<Real>{1, 0, 2})};
 }
