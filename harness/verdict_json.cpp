@@ -4,8 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/kernel.h"
+
 namespace nullmark {
 namespace {
+
+/// Numbers that a sample gives at most: a free path's scores in every channel.
+constexpr int kMaxOutputs = kMaxChannels * (static_cast<int>(kFreePathBins) + 3);
 
 constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
 
@@ -68,7 +73,7 @@ Json groups_json(const std::vector<const TestRecord*>& groups) {
 TestRecord read_test(const Place& place) {
   place.expect_object();
   TestRecord test;
-  test.channel = static_cast<int>(place["channel"].integer(-1, kMaxChannels - 1));
+  test.channel = static_cast<int>(place["channel"].integer(-1, kMaxOutputs - 1));
   test.samples = place["samples"].unsigned_integer(0, kAny);
   test.epsilon = read_real(place, "epsilon", 0);
   test.reference_error = read_real(place, "reference_error", kInfinity);
