@@ -23,7 +23,7 @@ struct NullCollisionTracking {
   static constexpr const char* kName = "null_collision";
   static constexpr const char* kSummary = "weighted tracking with event probabilities as given";
   static constexpr const char* kSource = "Galtier et al. 2013; Kutz, Habel, Li, Novak 2017, Sec. 3";
-  static constexpr SampleRange kRange = SampleRange::non_negative;
+  static constexpr SampleRange kRange = std::is_same_v<Value, Real> ? SampleRange::unit : SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
 
   std::string probabilities = "proportional", roulette = "one";
@@ -52,6 +52,8 @@ struct NullCollisionTracking {
   }
 
   Claim claim(Quantity) const { return Claim::unbiased; }
+
+  SampleRange range() const { return probabilities == "fixed" ? SampleRange::non_negative : kRange; }
 
   struct Ray : Passage<Value> {
     bool fixed = false, three = false;

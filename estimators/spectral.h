@@ -28,7 +28,7 @@ struct SpectralTracking {
   static constexpr const char* kName = "spectral";
   static constexpr const char* kSummary = "spectral tracking: one walk for all channels, event probabilities by a scheme";
   static constexpr const char* kSource = "Kutz, Habel, Li, Novak 2017, Sec. 5";
-  static constexpr SampleRange kRange = SampleRange::non_negative;
+  static constexpr SampleRange kRange = std::is_same_v<Value, Real> ? SampleRange::unit : SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
 
   std::string scheme = "history_aware_average", control = "none";

@@ -345,10 +345,7 @@ class EstimatorTemplate final : public EstimatorSource {
     visit_parameters(chromatic_, visit);
   }
   Claim claim(Quantity quantity) const override { return grey_.claim(quantity); }
-  SampleRange range() const override {
-    if constexpr (requires { grey_.range(); }) return grey_.range();
-    return Estimator<Real>::kRange;
-  }
+  SampleRange range(int channels) const override { return channels == 1 ? range_of(grey_) : range_of(chromatic_); }
   bool needs_bound() const override { return Estimator<Real>::kNeedsBound; }
   std::optional<Real> order(Quantity quantity) const override {
     if constexpr (requires { grey_.order(quantity); }) return grey_.order(quantity);
@@ -367,6 +364,12 @@ class EstimatorTemplate final : public EstimatorSource {
   }
 
  private:
+  template <class E>
+  static SampleRange range_of(const E& estimator) {
+    if constexpr (requires { estimator.range(); }) return estimator.range();
+    return E::kRange;
+  }
+
   template <class E>
   static void visit_parameters(E& estimator, ParameterVisitor& visit) {
     if constexpr (requires { estimator.parameters(visit); }) estimator.parameters(visit);

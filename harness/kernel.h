@@ -130,7 +130,7 @@ class EstimatorSource {
   virtual ~EstimatorSource() = default;
   virtual void parameters(ParameterVisitor& visit) = 0;
   virtual Claim claim(Quantity) const = 0;
-  virtual SampleRange range() const = 0;
+  virtual SampleRange range(int channels) const = 0;
   virtual bool needs_bound() const = 0;
   /// Of a consistent estimator; empty where none is stated.
   virtual std::optional<Real> order(Quantity) const = 0;

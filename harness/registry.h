@@ -28,7 +28,7 @@ EstimatorEntry estimator_entry() {
   entry.name = E::kName;
   entry.summary = E::kSummary;
   entry.source = E::kSource;
-  entry.range = E::kRange;
+  entry.range = Estimator<Spectrum>::kRange;
   entry.needs_bound = E::kNeedsBound;
   const auto kernel = EstimatorTemplate<Estimator>().kernel(1);
   for (std::size_t i = 0; i < kQuantities; ++i)

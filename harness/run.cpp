@@ -81,7 +81,7 @@ class Workshop {
     const auto source = located(cell.estimator.pointer, [&] { return make_estimator(cell.estimator); });
     located(cell.estimator.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
     prepared.claim = source->claim(cell.quantity);
-    prepared.range = source->range();
+    prepared.range = source->range(prepared.scene->medium->medium->channels());
     prepared.needs_bound = source->needs_bound();
     if (cell.quantity == Quantity::radiance) {
       add_light(prepared, *source);
@@ -107,8 +107,9 @@ class Workshop {
     if (!prepared.reason.empty()) return;
     prepared.kernel = make_path_kernel(source, light, cell.transport.general);
     // A path whose flights have weight 1 carries the radiance of one place; with next events it adds up several.
-    const bool one_place = prepared.range == SampleRange::binary && light.options.next_event == NextEvent::off &&
-                           light.medium->channels() == 1 && prepared.scene->bounding && brightest(light) <= 1;
+    const bool one_place = (prepared.range == SampleRange::binary || prepared.range == SampleRange::unit) &&
+                           light.options.next_event == NextEvent::off && light.medium->channels() == 1 &&
+                           prepared.scene->bounding && brightest(light) <= 1;
     prepared.range = one_place                                 ? SampleRange::unit
                      : prepared.range == SampleRange::any_sign ? SampleRange::any_sign
                                                                : SampleRange::non_negative;

@@ -47,7 +47,7 @@ class WrappedSource final : public EstimatorSource {
     honest_.parameters(visit);
   }
   Claim claim(Quantity quantity) const override { return honest_.claim(quantity); }
-  SampleRange range() const override { return honest_.range(); }
+  SampleRange range(int channels) const override { return honest_.range(channels); }
   bool needs_bound() const override { return honest_.needs_bound(); }
   std::optional<Real> order(Quantity quantity) const override { return honest_.order(quantity); }
   void check(const Extrema& medium) const override { honest_.check(medium); }
