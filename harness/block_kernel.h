@@ -98,15 +98,7 @@ class BlockKernel final : public Kernel {
     ray.entry = context.world.at(context.world.begin);
     if constexpr (requires { E::kNeedsInversion; })
       ray.distance_at_depth = [&medium, local = context.local](Real depth) { return distance_at_depth(medium, local, depth); };
-    if constexpr (requires { E::kNeedsShares; }) {
-      ray.shares.clear();
-      for (const Segment& segment : ray.bounds.segments) {
-        const Vec3 a = context.local.at(segment.begin), b = context.local.at(segment.end);
-        Spectrum bounds = medium.component_maxima({a.cwiseMin(b), a.cwiseMax(b)});
-        if (!(bounds.sum() > 0)) bounds.setOnes();
-        ray.shares.push_back(bounds / bounds.sum());
-      }
-    }
+    if constexpr (requires { E::kNeedsShares; }) detail::prepare_shares(ray, medium, context.local);
     ray.albedo = context.albedo.size() > 0 ? load<Value>(context.albedo.data(), channels_) : ray.value(0);
     ray.throughput = ray.value(1);
     if constexpr (requires { estimator_.prepare(ray); }) estimator_.prepare(ray);

@@ -21,6 +21,18 @@ struct RayOf<E, Value> {
   using type = typename E::Ray;
 };
 
+/// Chances of the components of a sum in every segment, in proportion to their bounds along it.
+template <class Along>
+void prepare_shares(Along& ray, const Medium& medium, const Ray& local) {
+  ray.shares.clear();
+  for (const Segment& segment : ray.bounds.segments) {
+    const Vec3 a = local.at(segment.begin), b = local.at(segment.end);
+    Spectrum bounds = medium.component_maxima({a.cwiseMin(b), a.cwiseMax(b)});
+    if (!(bounds.sum() > 0)) bounds.setOnes();
+    ray.shares.push_back(bounds / bounds.sum());
+  }
+}
+
 }  // namespace detail
 
 /// What all walks of a scene share.
@@ -148,6 +160,7 @@ class EstimatorWalker final : public Walker<Value> {
     if (needs_knots()) sorted_knots(*course.medium, local, ray.knots);
     if constexpr (requires { E::kNeedsInversion; })
       ray.distance_at_depth = [medium = course.medium, local](Real depth) { return distance_at_depth(*medium, local, depth); };
+    if constexpr (requires { E::kNeedsShares; }) detail::prepare_shares(ray, *course.medium, local);
     ray.degree = course.medium->polynomial_degree();
     ray.entry = world.at(world.begin);
     ray.albedo = course.albedo;
@@ -182,7 +195,12 @@ class EstimatorWalker final : public Walker<Value> {
     std::uint64_t lookups = 0;
     while (!patience.exhausted() && estimator_.propose(state.walk, state.ray, flight, rng)) {
       const Vec3 p = state.origin + flight.position() * state.direction;
-      course.medium->extinction({&p.x(), &p.y(), &p.z(), 1}, state.extinction.data());
+      if constexpr (requires { E::kNeedsShares; }) {
+        const int component = estimator_.component(state.walk);
+        state.extinction[0] = course.medium->component_extinction(component, p) / state.ray.shares[flight.piece()][component];
+      } else {
+        course.medium->extinction({&p.x(), &p.y(), &p.z(), 1}, state.extinction.data());
+      }
       ++lookups;
       const Value extinction = load<Value>(state.extinction.data(), course.channels);
       audit(state.ray, flight, extinction, counters);

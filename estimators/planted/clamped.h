@@ -39,7 +39,9 @@ struct PlantedClampedResidual : ResidualRatioTracking<Value> {
   using Ray = typename ResidualRatioTracking<Value>::Ray;
   using Walk = typename ResidualRatioTracking<Value>::Walk;
 
-  Value result(const Walk& walk, const Ray&) const { return clamped_to_unit(walk.weight); }
+  Value result(const Walk& walk, const Ray& ray) const {
+    return clamped_to_unit(ResidualRatioTracking<Value>::result(walk, ray));
+  }
 };
 
 /// Ratio tracking that caps the extinction at the majorant, so that a violated bound gives no negative weight and no complaint.

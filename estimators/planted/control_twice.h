@@ -15,7 +15,9 @@ struct PlantedControlTwice : ResidualRatioTracking<Value> {
   using Ray = typename ResidualRatioTracking<Value>::Ray;
   using Walk = typename ResidualRatioTracking<Value>::Walk;
 
-  Value result(const Walk& walk, const Ray& ray) const { return walk.weight * exponential(Value(-ray.control.depth)); }
+  Value result(const Walk& walk, const Ray& ray) const {
+    return ResidualRatioTracking<Value>::result(walk, ray) * exponential(Value(-ray.control.depth));
+  }
 };
 
 }  // namespace nullmark
