@@ -59,7 +59,8 @@ const std::vector<std::string>& metric_names() {
                                                   "weight_mean",
                                                   "weight_variance",
                                                   "weighted_cost",
-                                                  "draws_per_sample"};
+                                                  "draws_per_sample",
+                                                  "variance_x_ns"};
   return kNames;
 }
 
@@ -74,6 +75,10 @@ std::optional<Real> metric(const CellRecord& record, std::string_view name) {
   if (name == "weight_mean") return weight(record, &ChannelRecord::mean);
   if (name == "weight_variance") return weight(record, &ChannelRecord::variance);
   if (name == "weighted_cost") return weighted_cost(record.lookups_per_sample, weight(record, &ChannelRecord::variance));
+  if (name == "variance_x_ns") {
+    const std::optional<Real> variance = channel_average(record, &ChannelRecord::variance);
+    return variance && record.time ? std::optional(*variance * record.time->ns_per_sample) : std::nullopt;
+  }
   if (name == "draws_per_sample") return record.draws_per_sample;
   if (name == "ns_per_sample" && record.time) return record.time->ns_per_sample;
   if (name == "ns_per_lookup" && record.time) return record.time->ns_per_lookup;
