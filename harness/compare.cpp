@@ -8,6 +8,7 @@
 
 #include "harness/json_input.h"
 #include "harness/names.h"
+#include "harness/transport_json.h"
 
 namespace nullmark {
 namespace {
@@ -27,8 +28,9 @@ std::string ratio(const std::optional<Real>& value, const std::optional<Real>& b
 }
 
 std::string group_of(const CellRecord& record) {
-  return fmt::format("{} | {} | {} | {}", to_string(record.cell.quantity), record.medium.label, record.majorant.label,
-                     record.ray_set.label);
+  const std::string light = transport_label(record.cell.transport);
+  return fmt::format("{} | {} | {} | {}{}", to_string(record.cell.quantity), record.medium.label, record.majorant.label,
+                     record.ray_set.label, light.empty() ? "" : " | " + light);
 }
 
 }  // namespace

@@ -475,7 +475,7 @@ DraftTable read_table(const Place& place, const std::vector<Draft>& drafts, cons
     if (entry.has("tolerance")) {
       row.row.tolerance = read_positive(entry["tolerance"]);
       if (row.row.given.empty() || row.row.cells.empty())
-        entry["tolerance"].fail("found without \"given\" and \"cells\", which it compares");
+        entry["tolerance"].fail("needs \"given\" and \"cells\" beside it, which it compares");
     }
     draft.rows.push_back(std::move(row));
   }

@@ -106,6 +106,26 @@ TEST(FreePath, SurfacesEndFlights) {
   EXPECT_LT(std::abs(*record.channel[8].bias), 5.5 * std::sqrt(0.25 / 100000));
 }
 
+/// Where no walk is taken nothing is said of the tracker; where nothing emits there is nothing to estimate; and a mean that is
+/// known here cannot be given another value.
+TEST(Radiance, IsJudgedOnlyWhereTheTrackerTakesPart) {
+  const auto cell = [](const std::string& transport, const std::string& rest) {
+    return run(R"("quantity":"radiance","rays":"single","samples_per_ray":1000,"transport":)" + transport + "," + rest +
+               R"("matrix":{"estimator":["delta"],"medium":[{"type":"homogeneous","extinction":0.5}]})")
+        .at(0);
+  };
+  const CellRecord closed = cell(R"({"environment":1})", "");
+  EXPECT_EQ(closed.status, Status::ok);
+  EXPECT_FALSE(closed.verdict);
+  EXPECT_NE(closed.reason.find("takes no part"), std::string::npos) << closed.reason;
+  EXPECT_NEAR(*closed.channel[0].mean, std::exp(-0.5), 1e-15);
+  const CellRecord walked = cell(R"({"environment":1,"kernel":"general"})", R"("gate":{"max_samples_per_ray":4000000},)");
+  ASSERT_TRUE(walked.verdict);
+  EXPECT_EQ(walked.verdict->unbiased, Outcome::pass) << walked.verdict->reason;
+  EXPECT_EQ(cell("{}", "").status, Status::skipped);
+  EXPECT_THROW(cell(R"({"environment":1})", R"("reference":{"value":0.3,"error":1e-6,"source":"elsewhere"},)"), ParameterError);
+}
+
 /// Results with matter, surroundings and many outputs are read back as they were written.
 TEST(FreePath, ResultsAreReadBack) {
   const auto records = run(

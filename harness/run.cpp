@@ -30,6 +30,7 @@ struct PreparedCell {
   std::shared_ptr<const Kernel> kernel;
   std::string reason;
   std::vector<std::string> effects;  ///< of a radiance
+  bool takes_part = true;            ///< false: flights are closed forms, whatever the estimator
   Targets targets;
   CellTheory theory;
   std::uint64_t samples_per_ray = 0;
@@ -103,8 +104,10 @@ class Workshop {
                                   cell.transport);
     });
     prepared.effects = effect_names(cell.transport.general ? Effects{} : effects_of(light));
-    prepared.reason = why_no_paths(source, light, cell.transport.general);
+    prepared.reason = brightest(light) > 0 ? why_no_paths(source, light, cell.transport.general)
+                                           : "nothing emits; give \"environment\", \"emission\" or the \"radiance\" of surfaces";
     if (!prepared.reason.empty()) return;
+    prepared.takes_part = cell.transport.general || effects_of(light).heterogeneous;
     prepared.kernel = make_path_kernel(source, light, cell.transport.general);
     // A path whose flights have weight 1 carries the radiance of one place; with next events it adds up several.
     const bool one_place = (prepared.range == SampleRange::binary || prepared.range == SampleRange::unit) &&
@@ -255,7 +258,8 @@ bool is_judged(const PreparedCell& prepared) {
   const bool predicts_itself = !prepared.theory.ray_variance.empty();
   const bool claims = prepared.claim == Claim::exact || prepared.claim == Claim::unbiased ||
                       (prepared.claim == Claim::consistent && predicts_itself && prepared.targets.names.empty());
-  return prepared.cell->gate.enabled && claims && prepared.targets.known && prepared.cell->measurement == Measurement{};
+  return prepared.cell->gate.enabled && prepared.takes_part && claims && prepared.targets.known &&
+         prepared.cell->measurement == Measurement{};
 }
 
 /// The tests of a cell; nothing for cells that claim nothing that could be tested.
@@ -370,6 +374,7 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
     record.medium_hash = fmt::format("{:016x}", prepared.scene->medium->hash);
     if (record.channels > 1) record.effects.push_back("chromatic");
     if (cell.quantity == Quantity::radiance) record.effects = prepared.effects;
+    if (!prepared.takes_part) record.reason = "constant extinction: closed-form flights, the estimator takes no part";
   }
   return record;
 }

@@ -162,7 +162,7 @@ Summary summarise(RunRecord& run) {
     summary.exit = ExitCode::internal_error;
   else if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0)
     summary.exit = ExitCode::nothing_ran;
-  else if (summary.never_started > 0 || summary.unexpected_open > 0 || summary.pass + summary.violated == 0)
+  else if (summary.never_started > 0 || summary.unexpected_open > 0 || summary.pass == 0)
     summary.exit = ExitCode::inconclusive;
   return summary;
 }

@@ -21,7 +21,7 @@ struct Summary {
 
 /// Decides all verdicts again, in place, and counts them.  Exit code: FAIL or an expectation that was measured and not met 3;
 /// else errors 1; else nothing judged 5; else verdicts that are open although the plan foresaw a decision, cells never started,
-/// or nothing decided at all 77; else 0.
+/// or no cell that passed 77; else 0.
 Summary summarise(RunRecord& run);
 
 /// For the terminal: counts, then every cell that did not pass with its reason.

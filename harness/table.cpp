@@ -9,6 +9,7 @@
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/results_json.h"
+#include "harness/transport_json.h"
 #include "harness/verdict_json.h"
 
 namespace nullmark {
@@ -27,6 +28,7 @@ std::string heading(const CellRecord& record) {
     text += fmt::format(", {} samples per ray", cell.samples_per_ray);
   text += fmt::format(", seed {}", cell.seed);
   if (cell.own_streams) text += ", own streams";
+  if (const std::string light = transport_label(cell.transport); !light.empty()) text += ", " + light;
   if (cell.measurement.clamp) text += ", clamped";
   if (cell.measurement.quantise_bits > 0) text += fmt::format(", {} bits", cell.measurement.quantise_bits);
   return text;
@@ -70,7 +72,8 @@ Line channel_line(const CellRecord& record, std::size_t c) {
           once(record.time ? std::optional(record.time->floor_ratio) : std::nullopt),
           short_number(variance_x_ns(record, c)),
           first ? verdict_word(record) : "",
-          first ? to_string(record.status) + (record.reason.empty() ? "" : ": " + record.reason) : ""};
+          (first ? to_string(record.status) + (record.reason.empty() ? "" : ": " + record.reason) : std::string()) +
+              (channel.reference || !channel.mean ? "" : fmt::format("{}mean {:.6g}", first ? ", " : "", *channel.mean))};
 }
 
 void append_lines(const CellRecord& record, std::vector<Line>& lines) {

@@ -101,8 +101,15 @@ Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quant
   });
   if (given) {
     if (given->value.size() != 1 && given->value.size() != targets.outputs)
-      throw ParameterError(
-          "reference", fmt::format("found {} values; expected one, or {}, one an output", given->value.size(), targets.outputs));
+      throw ParameterError("reference", fmt::format("found {} values; expected 1, or {}, as many as a sample has numbers",
+                                                    given->value.size(), targets.outputs));
+    for (std::size_t i = 0; i < targets.mean.size(); ++i) {
+      const Real value = given->value[given->value.size() > 1 ? i % targets.outputs : 0], known = targets.mean[i];
+      constexpr Real kRounding = 1e-9;
+      if (std::isfinite(known) && std::abs(value - known) > std::abs(value) * given->error + targets.error[i] + kRounding)
+        throw ParameterError("reference", fmt::format("found {} ({}); the mean is known here, {:.9g} by {}", value, given->source,
+                                                      known, targets.method));
+    }
     for (std::size_t i = 0; i < targets.mean.size(); ++i) {
       targets.mean[i] = given->value[given->value.size() > 1 ? i % targets.outputs : 0];
       targets.error[i] = std::abs(targets.mean[i]) * given->error;
