@@ -39,6 +39,8 @@ inline constexpr PlantedScene kPlantedScenes[] = {
     {"planted_first_segment", R"("planted_first_segment")", kRising, kFourCells, kThroughTheBox, 0.169118},
     // mub = mu, so T is the chance of no collision: e^{-1/4 - 2/4 - 3/4 - 1} in place of e^{-1}
     {"planted_no_rewind", R"("planted_no_rewind")", kConstant, kFourCells, kThroughTheBox, -0.776870},
+    // E_i = e^{-(1 - i/4)} + (e^{-1/4} - e^{-(1 - i/4)}) E_{i+1} from cell i on; E_0/T - 1
+    {"planted_early_surface", R"("planted_early_surface")", kConstant, kFourCells, kThroughTheBox, 0.781164},
     // W(x) = e^{-b(x)(1-x)} + int_x^1 b(x) e^{-b(x)(y-x)} (1 - mu(y)/b(y)) W(y) dy, b the bound of the cell
     {"planted_carried_distance", R"("planted_carried_distance")", kRising, kFourCells, kThroughTheBox, 0.392205},
     // 1 - e^{-1}: the first collision never counts

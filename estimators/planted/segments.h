@@ -1,5 +1,6 @@
 #pragma once
 
+#include "estimators/delta.h"
 #include "estimators/ratio.h"
 
 namespace nullmark {
@@ -33,6 +34,32 @@ struct PlantedFirstSegment : RatioTracking<Value> {
   bool propose(Walk&, const Passage<Value>&, Flight& flight, auto& rng) const {
     while (flight.next(rng))
       if (flight.piece() > 0) return true;
+    return false;
+  }
+};
+
+/// Delta tracking through cells that looks for the surface at the ray's end before it looks for the cell's: a flight that
+/// overshoots both ends at the surface, although the cells in between were never sampled.  The order of a published kd-tree
+/// traversal.
+template <class Value>
+struct PlantedEarlySurface : DeltaTracking<Value> {
+  static constexpr const char* kName = "planted_early_surface";
+  static constexpr const char* kSummary = "wrong: delta tracking that meets the surface beyond its cell's end";
+  static constexpr const char* kSource = "";
+  static constexpr const char* kCaughtBy = "mean";
+
+  using Ray = typename DeltaTracking<Value>::Ray;
+  using Walk = typename DeltaTracking<Value>::Walk;
+
+  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+    while (!walk.done && flight.piece() < ray.majorant.size()) {
+      const std::size_t cell = flight.piece();
+      const Real exponential = rng.exponential();
+      if (flight.position() + exponential / ray.majorant.rate(cell) >= ray.end) return flight.advance_to(kInfinity);
+      const Real depth = flight.depth() + exponential;
+      if (depth < ray.majorant.depth_after(cell)) return flight.advance_to(depth);
+      flight.advance_to(ray.majorant.depth_after(cell));
+    }
     return false;
   }
 };
