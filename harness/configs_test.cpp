@@ -161,7 +161,7 @@ TEST(Configs, Seed000TreesLeaveHomogeneousMediaAlone) {
   EXPECT_EQ(trees, 4 * 6);
 }
 
-/// C24: history-aware schemes beat the others; those that do not depend on the albedo have the tabled variances.
+/// Kutz et al. 2017, Sec. 5: history-aware schemes beat the others; those that do not depend on the albedo have the tabled variances.
 TEST(Configs, Seed003SpectralRanksTheSchemes) {
   const auto records = run(shipped("seed_003_spectral.json"));
   std::map<std::string, const CellRecord*> constant;
