@@ -96,7 +96,7 @@ struct NullCollisionTracking {
 
   Theory theory(const Ray& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
-    std::vector<Real> rate, through, alive, growth;
+    std::vector<Real> rate, through, death, growth;
     for (std::size_t j = 0; j < profile.nodes(c).size(); ++j) {
       const Real mub = ray.majorant.rate(profile.nodes(c)[j].piece);
       rate.push_back(mub);
@@ -105,17 +105,10 @@ struct NullCollisionTracking {
       const Coefficients<Value> mu(extinction, ray.albedo, mub);
       const Real p = mub > 0 ? chances(ray, mu).null : 0, mu_n = channel(mu.null, c);
       through.push_back(mub * p);
-      alive.push_back(mub - through.back());
+      death.push_back(mub - through.back());
       growth.push_back(p > 0 ? mu_n * mu_n / (mub * p) - mub : -mub);
     }
-    alive = profile.running(alive);
-    for (Real& x : alive) x = std::exp(-x);
-    const Real depth = profile.optical_depth(c);
-    std::size_t j = 0;
-    const Real second = profile.integrate(c, [&](const RayProfile::Node&) { return growth[j++]; });
-    Theory theory{.variance = std::exp(-2 * depth) * std::expm1(second + 2 * depth)};
-    state_lookups(theory, profile, rate, through, alive);
-    return theory;
+    return theory_of_escape_weight(profile, c, rate, through, death, growth);
   }
 
   /// E[w^2; collision] = int sum_k mu_k^2/(mub P_k) K dx over absorption and scattering.

@@ -201,7 +201,7 @@ struct SpectralTracking {
   }
 
   static Theory theory_without_history(const Ray& ray, const RayProfile& profile, int c) {
-    std::vector<Real> rate, through, alive, growth;
+    std::vector<Real> rate, through, death, growth;
     for (std::size_t j = 0; j < profile.nodes(c).size(); ++j) {
       const std::size_t piece = profile.nodes(c)[j].piece;
       const Real mub = ray.majorant.rate(piece);
@@ -209,17 +209,10 @@ struct SpectralTracking {
       const Real factor = channel(step.factor, c);
       rate.push_back(mub * step.lookup);
       through.push_back(mub * step.null);
-      alive.push_back(mub - through.back());
+      death.push_back(mub - through.back());
       growth.push_back(through.back() * factor * factor - mub);
     }
-    alive = profile.running(alive);
-    for (Real& x : alive) x = std::exp(-x);
-    const Real depth = profile.optical_depth(c);
-    std::size_t j = 0;
-    const Real second = profile.integrate(c, [&](const RayProfile::Node&) { return growth[j++]; });
-    Theory theory{.variance = std::exp(-2 * depth) * std::expm1(second + 2 * depth)};
-    state_lookups(theory, profile, rate, through, alive);
-    return theory;
+    return theory_of_escape_weight(profile, c, rate, through, death, growth);
   }
 
   static bool is_constant(const Ray& ray, const RayProfile& profile) {

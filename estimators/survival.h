@@ -67,7 +67,22 @@ inline void state_lookups(Theory& theory, const RayProfile& profile, const std::
   theory.lookups_variance = std::max<Real>(0, integral(pairs) + mean - mean * mean);
 }
 
-/// The same for a walk that collides at `rate` and dies at `extinction` <= rate; the mean alone where channels share it.
+/// Theory of an escape weight X of mean T, from functions at the nodes of the profile: the rates of lookups and of surviving
+/// ones, the rate `death` at which walks end, and the growth of E[X^2; alive] a length: Var = T^2 (exp(int growth + 2 mu) - 1).
+inline Theory theory_of_escape_weight(const RayProfile& profile, int c, const std::vector<Real>& rate,
+                                      const std::vector<Real>& through, const std::vector<Real>& death,
+                                      const std::vector<Real>& growth) {
+  std::vector<Real> alive = profile.running(death);
+  for (Real& x : alive) x = std::exp(-x);
+  const Real depth = profile.optical_depth(c);
+  std::size_t j = 0;
+  const Real second = profile.integrate(c, [&](const RayProfile::Node&) { return growth[j++]; });
+  Theory theory{.variance = std::exp(-2 * depth) * std::expm1(second + 2 * depth)};
+  state_lookups(theory, profile, rate, through, alive);
+  return theory;
+}
+
+/// Of the lookups alone, where a walk collides at `rate` and dies at `extinction` <= rate; their mean where channels share it.
 template <class F, class R>
 void state_lookups_until_killed(Theory& theory, const RayProfile& profile, F&& extinction, R&& rate) {
   const auto alive = survival(profile, extinction);

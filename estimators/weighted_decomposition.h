@@ -108,24 +108,17 @@ struct WeightedDecompositionTracking {
 
   Theory theory(const Ray& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.rate, {&ray.rate, &ray.control});
-    std::vector<Real> growth, rate, through, alive;
+    std::vector<Real> growth, rate, through, death;
     for (const RayProfile::Node& at : profile.nodes(c)) {
       const Real mub = ray.rate.rate(at.piece), mu_c = ray.control.rate(at.piece);
       const Parts part(at.extinction, mu_c, mub);
       const Real null = std::abs(part.null);
       rate.push_back(mub - mu_c);
       through.push_back(part.sum > 0 ? rate.back() * null / part.sum : 0);
-      alive.push_back(mub - through.back());
+      death.push_back(mub - through.back());
       growth.push_back(rate.back() > 0 ? part.sum * null / rate.back() - mub : -mub);
     }
-    alive = profile.running(alive);
-    for (Real& x : alive) x = std::exp(-x);
-    const Real depth = profile.optical_depth(c);
-    std::size_t j = 0;
-    const Real second = profile.integrate(c, [&](const RayProfile::Node&) { return growth[j++]; });
-    Theory theory{.variance = std::exp(-2 * depth) * std::expm1(second + 2 * depth)};
-    state_lookups(theory, profile, rate, through, alive);
-    return theory;
+    return theory_of_escape_weight(profile, c, rate, through, death, growth);
   }
 
   /// E[w^2; collision] = int [mu_c + |mu - mu_c| A/(mub - mu_c)] K dx.

@@ -103,11 +103,12 @@ class Workshop {
       return make_transport_scene(plan_.media[cell.medium], *prepared.scene->medium, prepared.scene->majorant->structure,
                                   cell.transport);
     });
-    prepared.effects = effect_names(cell.transport.general ? Effects{} : effects_of(light));
+    const Effects effects = cell.transport.general ? Effects{} : effects_of(light);
+    prepared.effects = effect_names(effects);
     prepared.reason = brightest(light) > 0 ? why_no_paths(source, light, cell.transport.general)
                                            : "nothing emits; give \"environment\", \"emission\" or the \"radiance\" of surfaces";
     if (!prepared.reason.empty()) return;
-    prepared.takes_part = cell.transport.general || effects_of(light).heterogeneous;
+    prepared.takes_part = effects.heterogeneous;
     prepared.kernel = make_path_kernel(source, light, cell.transport.general);
     // A path whose flights have weight 1 carries the radiance of one place; with next events it adds up several.
     const bool one_place = (prepared.range == SampleRange::binary || prepared.range == SampleRange::unit) &&

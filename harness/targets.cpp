@@ -109,10 +109,8 @@ Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quant
       if (std::isfinite(known) && std::abs(value - known) > std::abs(value) * given->error + targets.error[i] + kRounding)
         throw ParameterError("reference", fmt::format("found {} ({}); the mean is known here, {:.9g} by {}", value, given->source,
                                                       known, targets.method));
-    }
-    for (std::size_t i = 0; i < targets.mean.size(); ++i) {
-      targets.mean[i] = given->value[given->value.size() > 1 ? i % targets.outputs : 0];
-      targets.error[i] = std::abs(targets.mean[i]) * given->error;
+      targets.mean[i] = value;
+      targets.error[i] = std::abs(value) * given->error;
     }
     targets.method = "given: " + given->source;
   }
