@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "estimators/estimator.h"
@@ -60,6 +61,12 @@ struct Control {
   int channels = 1;
   Value depth;  ///< tau_c over the ray
 
+  template <class Distance>
+  Distance profile(const Distance& t) const {
+    const Distance s = (t - begin) / length;
+    return linear ? Distance(first + growth * s) : Distance(first * exponential(growth * s));
+  }
+
   /// tau_c from the ray's begin to a distance t on it, in closed form.
   Value depth_to(Real t) const {
     const Real s = (t - begin) / length;
@@ -71,10 +78,15 @@ struct Control {
     return depth_before[segment] + of_segment[segment] * (t - segment_begin[segment]);
   }
 
-  Value at(Real t, std::size_t segment) const {
-    if (!linear && !exponential_profile) return of_segment[segment];
-    const Real s = (t - begin) / length;
-    return uniform_value<Value>(channels, linear ? first + growth * s : first * std::exp(growth * s));
+  /// At a distance on a segment; many of both give as many.
+  template <class Distance, class Segment>
+  auto at(const Distance& t, const Segment& segment) const {
+    using Result = std::conditional_t<std::is_same_v<Distance, Real>, Value, Distance>;
+    if (!linear && !exponential_profile) return Result(entry(of_segment, segment));
+    if constexpr (std::is_same_v<Distance, Real>)
+      return uniform_value<Value>(channels, profile(t));
+    else
+      return profile(t);
   }
 };
 

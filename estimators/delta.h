@@ -1,5 +1,7 @@
 #pragma once
 
+#include <variant>
+
 #include "estimators/estimator.h"
 #include "estimators/survival.h"
 
@@ -15,6 +17,9 @@ struct DeltaTracking {
   static constexpr const char* kSource = "Woodcock et al. 1965; Coleman 1968";
   static constexpr SampleRange kRange = SampleRange::binary;
   static constexpr bool kNeedsBound = true;
+  static constexpr bool kLanes = true;
+
+  static constexpr bool kChromatic = std::is_same_v<Value, Spectrum>;
 
   std::string walks = "shared";
 
@@ -45,47 +50,48 @@ struct DeltaTracking {
     }
   }
 
-  struct Walk {
-    Value transmittance;
-    int walking = 0;  ///< the channel of a separate walk
-    bool done = false;
-    Real distance = 0;  ///< of a grey walk's collision
+  struct Separate {
+    int walking = 0;  ///< the channel that walks
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
-    walk = {ray.value(1), 0, false, ray.end};
+  struct Walk : std::conditional_t<kChromatic, Separate, std::monostate> {
+    Value transmittance;
+    Truth<Value> done = false;
+    Distance<Value> distance = 0;  ///< of a grey walk's collision
+  };
+
+  void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
+    walk = {{}, ray.value(1), false, ray.end};
     if (!ray.per_channel.empty()) flight.start(ray.per_channel[0]);
   }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
-    if (ray.per_channel.empty()) return !walk.done && flight.next(rng);
-    while (walk.done || !flight.next(rng)) {
-      walk.done = false;
-      if (++walk.walking == ray.channels) return false;
-      flight.start(ray.per_channel[static_cast<std::size_t>(walk.walking)]);
-    }
-    return true;
-  }
-
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Real threshold = rng.uniform() * at.rate();
-    if (!ray.per_channel.empty()) {
-      if (threshold < channel(extinction, walk.walking)) {
-        channel(walk.transmittance, walk.walking) = 0;
-        walk.done = true;
+  auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    if constexpr (kChromatic) {
+      while (!ray.per_channel.empty()) {
+        if (flight.next(rng, !walk.done)) return true;
+        walk.done = false;
+        if (++walk.walking == ray.channels) return false;
+        flight.start(ray.per_channel[static_cast<std::size_t>(walk.walking)]);
       }
-      return;
     }
-    bool alive = false;
-    for (int c = 0; c < ray.channels; ++c) {
-      if (threshold < channel(extinction, c)) channel(walk.transmittance, c) = 0;
-      alive = alive || channel(walk.transmittance, c) > 0;
-    }
-    walk.done = !alive;
-    if (walk.done) walk.distance = at.position();
+    return flight.next(rng, !walk.done);
   }
 
-  Value result(const Walk& walk, const Ray&) const { return walk.transmittance; }
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
+    const Distance<Value> threshold = rng.uniform() * at.rate();
+    if constexpr (kChromatic) {
+      if (!ray.per_channel.empty()) {
+        walk.done = threshold < extinction[walk.walking];
+        if (walk.done) walk.transmittance[walk.walking] = 0;
+        return;
+      }
+    }
+    walk.transmittance = select(extinction > threshold, ray.value(0), walk.transmittance);
+    walk.done = vanished(walk.transmittance);
+    walk.distance = select(walk.done, at.position(), walk.distance);
+  }
+
+  Value result(const Walk& walk, const auto&) const { return walk.transmittance; }
 
   Value transmittance_at(const Walk& walk, const Ray&, Real) const { return walk.transmittance; }
 
@@ -96,11 +102,11 @@ struct DeltaTracking {
     return {walk.done ? EventKind::collision : EventKind::escape, walk.distance, ray.value(1)};
   }
 
-  int real_collisions(const Walk& walk, const Ray& ray) const {
-    if (ray.per_channel.empty()) return walk.done;
-    int dead = 0;
-    for (int c = 0; c < ray.channels; ++c) dead += channel(walk.transmittance, c) == 0;
-    return dead;
+  auto real_collisions(const Walk& walk, const auto& ray) const {
+    if constexpr (kChromatic)
+      return static_cast<int>(ray.per_channel.empty() ? walk.done : (walk.transmittance == 0).count());
+    else
+      return walk.done;
   }
 
   /// Where the majorant is violated every collision is accepted: the walk sees min(mu, mub).

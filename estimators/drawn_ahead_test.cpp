@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "estimators/rng.h"
-#include "media/logarithm.h"
+#include "media/elementary.h"
 
 namespace nullmark {
 namespace {

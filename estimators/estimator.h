@@ -27,6 +27,10 @@ enum class SampleRange { binary, unit, non_negative, any_sign };
 enum class Quantity { transmittance, optical_depth, transmittance_profile, free_path, radiance };
 inline constexpr std::size_t kQuantities = 5;
 
+/// Numbers that walks are made of.  Single precision: flights, lookups and weights in float, so a flight is told to 2^-24 of the
+/// majorant depth of its ray; means over samples are taken in double.
+enum class Precision { float64, float32 };
+
 /// Exact moments of one sample, where known; lookups are their expectation.
 struct Theory {
   std::optional<Real> mean{};  ///< left out: the quantity itself
@@ -103,6 +107,11 @@ struct Passage {
 //                                                           of a product of independent weights
 //   static constexpr bool kIgnoresMajorant                  lookups are no tentative collisions: not audited
 //   static constexpr bool kOwnFlights                       draws its flights by a law of its own
+//   static constexpr bool kLanes = true                     walks run side by side in registers, in double and in float: Walk
+//                                                           holds nothing but Value, Distance<Value> and Truth<Value>; init,
+//                                                           propose, consume and result take ray, flight and stream as auto
+//                                                           and decide by select() and flight.next(rng, alive) where walks
+//                                                           may differ (see lane_kernel.h)
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
 //                                                           asks the harness to fill exact_depth, knots, distance_at_depth,
 //                                                           shares

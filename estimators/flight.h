@@ -2,17 +2,25 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
 #include "media/majorants/majorant.h"
 
 namespace nullmark {
 
+/// A stretch of constant rate.
+template <class T>
+struct RatePiece {
+  T begin, end, rate, inverse_rate, depth_before, depth_after;
+};
+
 /// A piecewise constant sampling rate along a ray, 1/length, with its running depth int_begin^t rate.
 class Rates {
  public:
   void start(Real begin, Crossing crossing = Crossing::carry) {
     pieces_.clear();
+    single_.clear();
     begin_ = begin;
     crossing_ = crossing;
     total_depth_ = 0;
@@ -37,15 +45,28 @@ class Rates {
 
   /// Distance at which the depth, within piece i, is reached.
   Real position(std::size_t i, Real depth) const {
-    const Piece& piece = pieces_[i];
+    const RatePiece<Real>& piece = pieces_[i];
     return std::min(piece.end, piece.begin + (depth - piece.depth_before) * piece.inverse_rate);
   }
 
+  /// All pieces, for lanes; those in single precision are made when first asked for.
+  template <class T>
+  const RatePiece<T>* pieces() const {
+    if constexpr (std::is_same_v<T, Real>) {
+      return pieces_.data();
+    } else {
+      const auto narrow = [](Real x) { return static_cast<T>(x); };
+      if (single_.empty())
+        for (const RatePiece<Real>& p : pieces_)
+          single_.push_back({narrow(p.begin), narrow(p.end), narrow(p.rate), narrow(p.inverse_rate), narrow(p.depth_before),
+                             narrow(p.depth_after)});
+      return single_.data();
+    }
+  }
+
  private:
-  struct Piece {
-    Real begin, end, rate, inverse_rate, depth_before, depth_after;
-  };
-  std::vector<Piece> pieces_;
+  std::vector<RatePiece<Real>> pieces_;
+  mutable std::vector<RatePiece<float>> single_;
   Real begin_ = 0, total_depth_ = 0;
   Crossing crossing_ = Crossing::carry;
 };
@@ -63,7 +84,8 @@ class Flight {
     position_ = rates.begin();
   }
 
-  /// Moves to the next tentative collision; false when it lies beyond the ray's end.
+  /// Moves to the next tentative collision; false when it lies beyond the ray's end, or where the walk is not `alive`.
+  bool next(auto& rng, bool alive) { return alive && next(rng); }
   bool next(auto& rng) {
     const Real depth = depth_ + rng.exponential();
     // Most flights stay in their cell: only those that leave it ask for the rule.

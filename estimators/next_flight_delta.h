@@ -17,6 +17,7 @@ struct NextFlightDeltaTracking {
   static constexpr const char* kSource = "Novak, Georgiev, Hanika, Jarosz 2018";
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = true;
+  static constexpr bool kLanes = true;
 
   std::string variant = "a";
 
@@ -34,32 +35,27 @@ struct NextFlightDeltaTracking {
 
   struct Walk {
     Value alive, sum;
-    bool done = false;
+    Truth<Value> done = false;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
-    walk = {ray.value(1), ray.value(std::exp(-flight.depth_left())), false};
+  void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
+    const Value one = ray.value(1);
+    walk = {one, one * exponential(-flight.depth_left()), false};
   }
 
-  bool propose(Walk& walk, const Ray&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
+  auto propose(Walk& walk, const auto&, auto& flight, auto& rng) const { return flight.next(rng, !walk.done); }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Real escape = std::exp(-at.depth_left()), threshold = rng.uniform() * at.rate();
-    bool any = false;
-    for (int c = 0; c < ray.channels; ++c) {
-      Real& alive = channel(walk.alive, c);
-      const Real mu = channel(extinction, c);
-      if (ray.weigh_all) channel(walk.sum, c) += alive * ((at.rate() - mu) / at.rate()) * escape;
-      if (threshold < mu) alive = 0;
-      if (!ray.weigh_all) channel(walk.sum, c) += alive * escape;
-      any = any || alive > 0;
-    }
-    walk.done = !any;
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
+    const Distance<Value> escape = exponential(-at.depth_left()), threshold = rng.uniform() * at.rate();
+    if (ray.weigh_all) walk.sum += walk.alive * ((at.rate() - extinction) / at.rate()) * escape;
+    walk.alive = select(extinction > threshold, ray.value(0), walk.alive);
+    if (!ray.weigh_all) walk.sum += walk.alive * escape;
+    walk.done = vanished(walk.alive);
   }
 
-  Value result(const Walk& walk, const Ray&) const { return walk.sum; }
+  Value result(const Walk& walk, const auto&) const { return walk.sum; }
 
-  int real_collisions(const Walk& walk, const Ray&) const { return walk.done; }
+  auto real_collisions(const Walk& walk, const auto&) const { return walk.done; }
 
   /// Renewal at collisions of rate mub: with q the chance to live on, c what a collision adds, K(y) = exp(-int_0^y mub (1 - q))
   /// and I(y) = int_0^y mub c K, the sum beyond the first term has mean I(d) and second moment int mub (K c^2 + 2 c q (I(d) -

@@ -13,6 +13,7 @@ struct NextFlightRatioTracking {
   static constexpr const char* kSource = "Novak, Georgiev, Hanika, Jarosz 2018; Georgiev et al. 2019";
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kLanes = true;
 
   Claim claim(Quantity) const { return Claim::unbiased; }
 
@@ -20,19 +21,19 @@ struct NextFlightRatioTracking {
     Value weight, sum;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto&) const {
+  void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
     walk.weight = ray.value(1);
-    walk.sum = ray.value(std::exp(-flight.depth_left()));
+    walk.sum = walk.weight * exponential(-flight.depth_left());
   }
 
-  bool propose(Walk&, const Passage<Value>&, Flight& flight, auto& rng) const { return flight.next(rng); }
+  auto propose(Walk&, const auto&, auto& flight, auto& rng) const { return flight.next(rng); }
 
-  void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
     walk.weight *= (at.rate() - extinction) / at.rate();
-    walk.sum += walk.weight * std::exp(-at.depth_left());
+    walk.sum += walk.weight * exponential(-at.depth_left());
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.sum; }
+  Value result(const Walk& walk, const auto&) const { return walk.sum; }
 
   /// M2 = G(0) + int_0^d mub a^2 k G dy over local majorants, with v(y) = exp(-int_y^d mub), a = 1 - mu/mub, G = 2 v T(y,d) - v^2
   /// and k(y) = exp(-int_0^y (2 mu - mu^2/mub)).  Nothing where the panels do not resolve v.

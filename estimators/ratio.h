@@ -13,6 +13,7 @@ struct RatioTracking {
   static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Alg. 1";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kLanes = true;
 
   Claim claim(Quantity) const { return Claim::unbiased; }
 
@@ -20,15 +21,15 @@ struct RatioTracking {
     Value weight;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk.weight = ray.value(1); }
+  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk.weight = ray.value(1); }
 
-  bool propose(Walk&, const Passage<Value>&, Flight& flight, auto& rng) const { return flight.next(rng); }
+  auto propose(Walk&, const auto&, auto& flight, auto& rng) const { return flight.next(rng); }
 
-  void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
     walk.weight *= (at.rate() - extinction) / at.rate();
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+  Value result(const Walk& walk, const auto&) const { return walk.weight; }
 
   Value transmittance_at(const Walk& walk, const Passage<Value>&, Real) const { return walk.weight; }
 

@@ -17,6 +17,7 @@ struct RayMarching {
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kIgnoresMajorant = true;
+  static constexpr bool kLanes = true;
 
   int steps = 32;
   std::string offset = "midpoint";
@@ -53,25 +54,27 @@ struct RayMarching {
 
   struct Walk {
     Value sum;
-    Real offset = 0;
-    int done = 0;
+    Distance<Value> offset = 0, done = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
-    walk = {ray.value(0), ray.uniform ? rng.uniform() : ray.fixed, 0};
+  void init(Walk& walk, const auto& ray, auto&, auto& rng) const {
+    walk = {ray.value(0), ray.fixed, 0};
+    if (ray.uniform) walk.offset = rng.uniform();
   }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
-    if (walk.done == steps || !(ray.step > 0)) return false;
+  auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    const auto goes_on = walk.done < (ray.step > 0 ? steps : 0);
+    if (none(goes_on)) return goes_on;
     if (ray.stratified) walk.offset = rng.uniform();
-    flight.jump(ray.begin + (walk.done++ + walk.offset) * ray.step);
-    return true;
+    flight.jump(ray.begin + (walk.done + walk.offset) * ray.step);
+    walk.done += 1;
+    return goes_on;
   }
 
-  void consume(Walk& walk, const Ray&, const Flight&, const Value& extinction, auto&) const { walk.sum += extinction; }
+  void consume(Walk& walk, const auto&, const auto&, const Value& extinction, auto&) const { walk.sum += extinction; }
 
-  Value optical_depth(const Walk& walk, const Ray& ray) const { return walk.sum * ray.step; }
-  Value result(const Walk& walk, const Ray& ray) const { return exponential(Value(-walk.sum * ray.step)); }
+  Value optical_depth(const Walk& walk, const auto& ray) const { return walk.sum * ray.step; }
+  Value result(const Walk& walk, const auto& ray) const { return exponential(Value(-walk.sum * ray.step)); }
 
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity quantity) const {
     if (!(ray.step > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};

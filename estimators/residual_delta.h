@@ -14,6 +14,7 @@ struct ResidualDeltaTracking {
   static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Sec. 4";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = true;
+  static constexpr bool kLanes = true;
 
   ControlChoice choice;
 
@@ -47,34 +48,30 @@ struct ResidualDeltaTracking {
 
   struct Walk {
     Value transmittance;  ///< estimate of T_r, 1 until the channel dies
-    bool done = false;
+    Truth<Value> done = false;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+  void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
     walk = {ray.value(1), false};
     flight.start(ray.residual);
   }
 
-  bool propose(Walk& walk, const Ray&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
+  auto propose(Walk& walk, const auto&, auto& flight, auto& rng) const { return flight.next(rng, !walk.done); }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Real threshold = rng.uniform() * at.rate();
-    const Value control = ray.control.at(at.position(), at.piece());
-    bool any = false;
-    for (int c = 0; c < ray.channels; ++c) {
-      if (threshold < channel(extinction, c) - channel(control, c)) channel(walk.transmittance, c) = 0;
-      any = any || channel(walk.transmittance, c) > 0;
-    }
-    walk.done = !any;
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
+    const Distance<Value> threshold = rng.uniform() * at.rate();
+    const Value residual = extinction - ray.control.at(at.position(), at.piece());
+    walk.transmittance = select(residual > threshold, ray.value(0), walk.transmittance);
+    walk.done = vanished(walk.transmittance);
   }
 
-  Value result(const Walk& walk, const Ray& ray) const { return exponential(Value(-ray.control.depth)) * walk.transmittance; }
+  Value result(const Walk& walk, const auto& ray) const { return exponential(Value(-ray.control.depth)) * walk.transmittance; }
 
   Value transmittance_at(const Walk& walk, const Ray& ray, Real distance) const {
     return exponential(Value(-ray.control.depth_to(distance))) * walk.transmittance;
   }
 
-  int real_collisions(const Walk& walk, const Ray&) const { return walk.done; }
+  auto real_collisions(const Walk& walk, const auto&) const { return walk.done; }
 
   /// Where the rate is violated every collision is accepted: the walk sees min(mu - mu_c, mubr).
   Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {

@@ -15,6 +15,7 @@ struct ResidualRatioTracking {
   static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Alg. 2";
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kLanes = true;
 
   ControlChoice choice;
   std::string component = "product";
@@ -52,18 +53,18 @@ struct ResidualRatioTracking {
     Value weight;  ///< estimate of T_r
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+  void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
     walk.weight = ray.value(1);
     flight.start(ray.residual);
   }
 
-  bool propose(Walk&, const Ray& ray, Flight& flight, auto& rng) const { return ray.with_residual && flight.next(rng); }
+  auto propose(Walk&, const auto& ray, auto& flight, auto& rng) const { return flight.next(rng, ray.with_residual); }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
     walk.weight *= (at.rate() - (extinction - ray.control.at(at.position(), at.piece()))) / at.rate();
   }
 
-  Value result(const Walk& walk, const Ray& ray) const {
+  Value result(const Walk& walk, const auto& ray) const {
     return ray.with_control ? Value(exponential(Value(-ray.control.depth)) * walk.weight) : walk.weight;
   }
 

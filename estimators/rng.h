@@ -1,9 +1,9 @@
 #pragma once
 
 #include <bit>
-#include <cmath>
 #include <cstdint>
 
+#include "media/elementary.h"
 #include "media/philox.h"
 #include "media/types.h"
 
@@ -38,7 +38,7 @@ class Rng {
 
   /// Unit exponential -log(1 - u); 1 - u is exact, so u = 0 gives 0 and u = 1 - 2^-53 gives 36.7.
   Real exponential() {
-    if (ready_ < 0) return -std::log(1 - uniform());
+    if (ready_ < 0) return negative_logarithm(1 - uniform());
     const Real e = ready_;
     ready_ = -1;
     ++draws_;

@@ -17,48 +17,41 @@ struct WeightedDeltaTracking {
   static constexpr const char* kSource = "Carter, Cashwell, Taylor 1972; Kutz et al. 2017, Sec. 3";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kLanes = true;
 
   Claim claim(Quantity) const { return Claim::unbiased; }
 
   struct Walk {
-    Value weight;
-    bool done = false;
-    Real distance = 0, collision = 0;  ///< of a grey walk: where it ended, and the weight of its collision
+    Value weight, collision;  ///< of each channel's walk so far, and of its collision
+    Truth<Value> done = false;
+    Distance<Value> distance = 0;  ///< where a grey walk ended
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), false, ray.end, 0}; }
+  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(1), ray.value(0), false, ray.end}; }
 
-  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
+  auto propose(Walk& walk, const auto&, auto& flight, auto& rng) const { return flight.next(rng, !walk.done); }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Real u = rng.uniform();
-    bool alive = false;
-    for (int c = 0; c < ray.channels; ++c) {
-      Real& weight = channel(walk.weight, c);
-      const Real mu = channel(extinction, c), sum = sum_of_rates(mu, at.rate());
-      if (u * sum < mu) {
-        walk.collision = weight * (sum / at.rate());
-        weight = 0;
-      } else {
-        weight *= (mu > at.rate() ? -sum : sum) / at.rate();
-      }
-      alive = alive || weight != 0;
-    }
-    walk.done = !alive;
-    if (walk.done) walk.distance = at.position();
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
+    const Distance<Value> u = rng.uniform();
+    const Value sum = sum_of_rates(extinction, at.rate()), grown = sum / at.rate();
+    const Value null = select(extinction > at.rate(), -grown, grown);
+    walk.collision = select(extinction > u * sum, walk.weight * grown, walk.collision);
+    walk.weight = select(extinction > u * sum, ray.value(0), walk.weight * null);
+    walk.done = vanished(walk.weight);
+    walk.distance = select(walk.done, at.position(), walk.distance);
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+  Value result(const Walk& walk, const auto&) const { return walk.weight; }
 
   /// Channels that share a walk end apart.
   bool samples_events(int channels) const { return channels == 1; }
 
   Event<Value> event(const Walk& walk, const Passage<Value>& ray) const {
     if (!walk.done) return {EventKind::escape, ray.end, walk.weight};
-    return {EventKind::collision, walk.distance, ray.value(walk.collision)};
+    return {EventKind::collision, walk.distance, walk.collision};
   }
 
-  int real_collisions(const Walk& walk, const Passage<Value>&) const { return walk.done; }
+  auto real_collisions(const Walk& walk, const auto&) const { return walk.done; }
 
   Theory theory(const Passage<Value>& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
@@ -94,7 +87,10 @@ struct WeightedDeltaTracking {
 
  private:
   /// mu + |mub - mu|; mub itself where it bounds, so that weights stay 1 to the last bit.
-  static Real sum_of_rates(Real mu, Real mub) { return mu > mub ? mu + (mu - mub) : mub; }
+  template <class V>
+  static V sum_of_rates(const V& mu, const Distance<V>& mub) {
+    return larger(mu, mub) + larger(mu - mub, 0);
+  }
 };
 
 }  // namespace nullmark

@@ -7,7 +7,7 @@
 #include "harness/kernel.h"
 #include "harness/walker.h"
 #include "media/inversion.h"
-#include "media/logarithm.h"
+#include "media/elementary.h"
 
 namespace nullmark {
 
@@ -15,17 +15,19 @@ namespace nullmark {
 /// one indirect call, all consume, the finished leave.  So there is one kernel per estimator and one per medium instead of one
 /// per pair, and the loop alone counts, audits the majorant and hands out random streams.
 template <template <class> class Estimator, class Value>
-class BlockKernel final : public Kernel {
+class BlockKernel : public Kernel {
   using E = Estimator<Value>;
   using Ray = typename detail::RayOf<E, Value>::type;
   using Walk = typename E::Walk;
 
   static constexpr std::size_t kBlock = 256;
+
+ protected:
   /// A walk this long is reported as an error instead of running on: nothing may hang, and nothing may be cut short in silence.
   static constexpr std::uint32_t kMostLookups = 1u << 30;
   static constexpr std::uint32_t kStepsBetweenStops = 1u << 14;
 
-  struct State final : Workspace {
+  struct State : Workspace {
     Ray ray;
     std::array<Walk, kBlock> walk;
     std::array<Flight, kBlock> flight;
@@ -36,6 +38,7 @@ class BlockKernel final : public Kernel {
     std::vector<std::uint32_t> marked;  ///< of a profile, per walk: marks told
   };
 
+ private:
   static constexpr bool kSamplesEvents = requires(const E& e, const Walk& walk, const Ray& ray) { e.event(walk, ray); };
   static constexpr bool kTellsProfile = requires(const E& e, const Walk& walk, const Ray& ray) {
     e.transmittance_at(walk, ray, Real{0});
@@ -326,49 +329,6 @@ class BlockKernel final : public Kernel {
 
   E estimator_;
   int channels_;
-};
-
-/// Adapts an estimator template to the registry: its parameters live in the grey instance.
-template <template <class> class Estimator>
-class EstimatorTemplate final : public EstimatorSource {
- public:
-  void parameters(ParameterVisitor& visit) override {
-    visit_parameters(grey_, visit);
-    visit_parameters(chromatic_, visit);
-  }
-  Claim claim(Quantity quantity) const override { return grey_.claim(quantity); }
-  SampleRange range(int channels) const override { return channels == 1 ? range_of(grey_) : range_of(chromatic_); }
-  bool needs_bound() const override { return Estimator<Real>::kNeedsBound; }
-  std::optional<Real> order(Quantity quantity) const override {
-    if constexpr (requires { grey_.order(quantity); }) return grey_.order(quantity);
-    return std::nullopt;
-  }
-  void check(const Extrema& medium) const override {
-    if constexpr (requires { grey_.check(medium); }) grey_.check(medium);
-  }
-  std::unique_ptr<const Kernel> kernel(int channels) const override {
-    if (channels == 1) return std::make_unique<BlockKernel<Estimator, Real>>(grey_, 1);
-    return std::make_unique<BlockKernel<Estimator, Spectrum>>(chromatic_, channels);
-  }
-  Walkers walkers() const override {
-    return {std::make_shared<EstimatorWalker<Estimator, Real>>(grey_),
-            std::make_shared<EstimatorWalker<Estimator, Spectrum>>(chromatic_)};
-  }
-
- private:
-  template <class E>
-  static SampleRange range_of(const E& estimator) {
-    if constexpr (requires { estimator.range(); }) return estimator.range();
-    return E::kRange;
-  }
-
-  template <class E>
-  static void visit_parameters(E& estimator, ParameterVisitor& visit) {
-    if constexpr (requires { estimator.parameters(visit); }) estimator.parameters(visit);
-  }
-
-  Estimator<Real> grey_;
-  Estimator<Spectrum> chromatic_;
 };
 
 }  // namespace nullmark

@@ -3,7 +3,9 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
+#include "estimators/lane_rng.h"
 #include "media/types.h"
 
 namespace nullmark {
@@ -40,6 +42,33 @@ inline Real floor_loop(PlainRng& rng, Real inverse_rate, std::uint64_t steps) {
   Real t = 0;
   for (std::uint64_t i = 0; i < steps; ++i) t -= std::log(1 - rng.uniform()) * inverse_rate;
   return t;
+}
+
+/// The same in registers of this build's width: the least that `steps` tentative
+/// collisions, a multiple of the lanes, can cost.
+template <class T>
+Real lane_floor_loop(typename LaneRng<T, kNativeLanes<T>>::State& streams, Real inverse_rate, std::uint64_t steps) {
+  using Pack = Lanes<T, kNativeLanes<T>>;
+  LaneRng<T, kNativeLanes<T>> rng(streams, true);
+  Pack t = 0;
+  for (std::uint64_t i = 0; i < steps; i += kNativeLanes<T>) t += rng.exponential() * Pack(inverse_rate);
+  T lanes[kNativeLanes<T>];
+  t.store(lanes);
+  return lanes[0];
+}
+
+/// Reads of one number from random cache lines of a buffer, none waiting for another: the least that a lookup in so much memory
+/// can cost.
+inline float memory_floor_loop(const std::vector<float>& buffer, std::uint64_t& at, std::uint64_t reads) {
+  constexpr std::uint64_t kLine = 64 / sizeof(float), kStep = 0x9e3779b97f4a7c15;
+  const std::uint64_t lines = buffer.size() / kLine;
+  float sum = 0;
+  for (std::uint64_t i = 0; i < reads; ++i) {
+    at += kStep;
+    const std::uint64_t mixed = (at ^ (at >> 32)) * 0xd6e8feb86659fd93;
+    sum += buffer[(mixed >> 32) * lines / (std::uint64_t{1} << 32) * kLine];
+  }
+  return sum;
 }
 
 /// Ratio tracking as one would write it by hand for one ray of length 1 and one medium; adds its lookups to `lookups`.

@@ -36,8 +36,8 @@ using Test = std::function<bool(const Draft&)>;
 
 constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
 
-const std::vector<std::string> kAxes = {"estimator",       "medium",        "majorant", "rays",        "quantity",
-                                        "samples_per_ray", "equal_lookups", "seed",     "measurement", "transport"};
+const std::vector<std::string> kAxes = {"estimator",     "medium", "majorant",    "rays",      "quantity", "samples_per_ray",
+                                        "equal_lookups", "seed",   "measurement", "transport", "precision"};
 const std::vector<std::string> kSingle = {"images", "image_maximum", "own_streams", "gate", "reference"};
 
 std::vector<std::string> joined(std::vector<std::string> a, const std::vector<std::string>& b) {
@@ -46,6 +46,8 @@ std::vector<std::string> joined(std::vector<std::string> a, const std::vector<st
 }
 
 Quantity read_quantity(const Place& place) { return *quantity_named(place.one_of(quantity_names(), "quantity")); }
+
+Precision read_precision(const Place& place) { return precision_named(place.one_of(precision_names(), "precision")); }
 
 Measurement read_measurement(const Place& place) {
   place.expect_keys({"clamp", "quantise_bits"});
@@ -124,6 +126,8 @@ std::vector<Setter> read_axis(const std::string& key, const Place& place) {
     return setters(media, [](Draft& d, const MediumSpec& m) { d.medium = m; });
   }
   if (key == "quantity") return setters(each(place, read_quantity), [](Draft& d, Quantity q) { d.cell.quantity = q; });
+  if (key == "precision")
+    return setters(each(place, read_precision), [](Draft& d, Precision precision) { d.cell.precision = precision; });
   if (key == "measurement")
     return setters(each(place, read_measurement), [](Draft& d, const Measurement& m) { d.cell.measurement = m; });
   if (key == "transport")
@@ -190,6 +194,8 @@ Test read_test(const std::string& key, const Place& place) {
     return any_matches(read_medium_patterns(place), [](const Draft& d, const MediumSpec& m) { return matches(m, *d.medium); });
   if (key == "quantity")
     return any_matches(each(place, read_quantity), [](const Draft& d, Quantity q) { return d.cell.quantity == q; });
+  if (key == "precision")
+    return any_matches(each(place, read_precision), [](const Draft& d, Precision p) { return d.cell.precision == p; });
   if (key == "measurement")
     return any_matches(each(place, read_measurement),
                        [](const Draft& d, const Measurement& m) { return d.cell.measurement == m; });
@@ -361,9 +367,9 @@ class PlanBuilder {
 bool same_statistics(const Draft& a, const Draft& b) {
   return a.cell.experiment == b.cell.experiment && a.estimator == b.estimator && a.medium == b.medium &&
          a.majorant == b.majorant && a.rays == b.rays && a.cell.quantity == b.cell.quantity &&
-         a.cell.measurement == b.cell.measurement && a.cell.transport == b.cell.transport &&
-         a.cell.samples_per_ray == b.cell.samples_per_ray && a.cell.equal_lookups == b.cell.equal_lookups &&
-         a.cell.seed == b.cell.seed && a.cell.own_streams == b.cell.own_streams;
+         a.cell.precision == b.cell.precision && a.cell.measurement == b.cell.measurement &&
+         a.cell.transport == b.cell.transport && a.cell.samples_per_ray == b.cell.samples_per_ray &&
+         a.cell.equal_lookups == b.cell.equal_lookups && a.cell.seed == b.cell.seed && a.cell.own_streams == b.cell.own_streams;
 }
 
 TimingPlan read_timing(const Place& place) {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "media/logarithm.h"
+#include "media/elementary.h"
 
 namespace nullmark {
 namespace {

@@ -136,7 +136,8 @@ class EstimatorSource {
   virtual std::optional<Real> order(Quantity) const = 0;
   /// Throws ParameterError where the parameters do not fit the medium.
   virtual void check(const Extrema& medium) const = 0;
-  virtual std::unique_ptr<const Kernel> kernel(int channels) const = 0;
+  /// Null where there is none of that precision.
+  virtual std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64) const = 0;
   virtual Walkers walkers() const { return {}; }
 };
 

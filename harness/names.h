@@ -45,6 +45,18 @@ inline const std::vector<std::string>& quantity_names() {
 
 inline const std::string& to_string(Quantity quantity) { return quantity_names()[static_cast<std::size_t>(quantity)]; }
 
+inline const std::vector<std::string>& precision_names() {
+  static const std::vector<std::string> kNames = {"double", "float"};
+  return kNames;
+}
+
+inline const std::string& to_string(Precision precision) { return precision_names()[static_cast<std::size_t>(precision)]; }
+
+/// The precision of a name that is one of them.
+inline Precision precision_named(const std::string& name) {
+  return name == precision_names()[0] ? Precision::float64 : Precision::float32;
+}
+
 /// The quantity of a name; nothing where there is none.
 inline std::optional<Quantity> quantity_named(const std::string& name) {
   for (std::size_t i = 0; i < quantity_names().size(); ++i)

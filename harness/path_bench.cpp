@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "estimators/delta.h"
-#include "harness/block_kernel.h"
+#include "harness/estimator_template.h"
 #include "harness/path_kernel.h"
 #include "media/gaussian_bump.h"
 #include "media/homogeneous.h"

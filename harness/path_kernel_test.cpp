@@ -13,7 +13,7 @@
 #include "estimators/delta.h"
 #include "estimators/ratio.h"
 #include "estimators/regular.h"
-#include "harness/block_kernel.h"
+#include "harness/estimator_template.h"
 #include "harness/registry.h"
 #include "media/channels.h"
 #include "media/exponential.h"

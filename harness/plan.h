@@ -116,6 +116,7 @@ struct Cell {
   Component estimator;
   std::size_t medium = 0, majorant = 0, rays = 0;
   Quantity quantity = Quantity::transmittance;
+  Precision precision = Precision::float64;
   Measurement measurement;
   TransportSpec transport;
   std::uint64_t samples_per_ray = 1;

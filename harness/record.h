@@ -34,13 +34,14 @@ struct ConvergenceRecord {
 
 struct TimeRecord {
   Real ns_per_sample = 0, ns_per_lookup = 0;
-  Real floor_ratio = 0;  ///< ns per lookup over random number + logarithm + advance in the same process
+  Real floor_ratio = 0;  ///< ns per lookup over random number + logarithm + advance in registers of the cell's precision
   Real loop_ratio = 0;   ///< ns per lookup over the plain hand-written ratio loop on a constant medium in the same process
   Real mad = 0;          ///< median absolute deviation of ns_per_sample
   int repetitions = 0, threads = 1;
   std::uint64_t samples_per_traversal = 1;
   std::vector<Real> repetition_ns;  ///< ns per sample of each repetition
   Real majorant_build_seconds = 0;  ///< wall time of building the majorant structure, on all threads
+  Real memory_ratio = 0;  ///< of volumes: ns per lookup over one read of a random cache line of as many bytes; else 0
 };
 
 /// PASS: |bias| < epsilon is proven.  FAIL: bias is proven.  INCONCLUSIVE: neither, with the reason.  VIOLATED: the estimator

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "estimators/estimator.h"
-#include "harness/block_kernel.h"
+#include "harness/estimator_template.h"
 #include "media/registry.h"
 
 namespace nullmark {

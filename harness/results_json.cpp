@@ -70,6 +70,7 @@ Json time_json(const CellRecord& record) {
   return {{"ns_per_sample", real(time.ns_per_sample)},
           {"ns_per_lookup", real(time.ns_per_lookup)},
           {"floor_ratio", real(time.floor_ratio)},
+          {"memory_ratio", real(time.memory_ratio)},
           {"loop_ratio", real(time.loop_ratio)},
           {"repetitions", time.repetitions},
           {"mad", real(time.mad)},
@@ -189,6 +190,7 @@ TimeRecord read_time(const Place& place) {
   time.ns_per_sample = real_or_nan(place, "ns_per_sample");
   time.ns_per_lookup = real_or_nan(place, "ns_per_lookup");
   time.floor_ratio = real_or_nan(place, "floor_ratio");
+  if (place.has("memory_ratio")) time.memory_ratio = real_or_nan(place, "memory_ratio");
   time.loop_ratio = real_or_nan(place, "loop_ratio");
   time.mad = real_or_nan(place, "mad");
   time.repetitions = static_cast<int>(place["repetitions"].integer(0, std::numeric_limits<int>::max()));
@@ -270,6 +272,7 @@ Json cell_json(const CellRecord& record) {
                {"majorant", std::move(majorant)},
                {"ray_set", typed(record.ray_set)},
                {"quantity", to_string(cell.quantity)},
+               {"precision", to_string(cell.precision)},
                {"measurement", measurement_json(cell.measurement)},
                {"transport", transport_json(cell.transport)},
                {"channels", record.channels},
@@ -332,6 +335,7 @@ CellRecord read_cell(const Place& place) {
         StructureSize{count(place["majorant"], "cells"), count(place["majorant"], "nodes"), count(place["majorant"], "bytes")};
   record.ray_set = read_component(ComponentKind::ray_set, place["ray_set"]);
   cell.quantity = *quantity_named(place["quantity"].one_of(quantity_names(), "quantity"));
+  if (place.has("precision")) cell.precision = precision_named(place["precision"].one_of(precision_names(), "precision"));
   cell.measurement.clamp = place["measurement"]["clamp"].boolean();
   cell.measurement.quantise_bits = static_cast<int>(place["measurement"]["quantise_bits"].integer(0, 31));
   if (place.has("transport")) cell.transport = read_transport(place["transport"]);

@@ -84,11 +84,11 @@ class Workshop {
     prepared.claim = source->claim(cell.quantity);
     prepared.range = source->range(prepared.scene->medium->medium->channels());
     prepared.needs_bound = source->needs_bound();
-    if (cell.quantity == Quantity::radiance) {
+    if (cell.quantity == Quantity::radiance && cell.precision == Precision::float64) {
       add_light(prepared, *source);
     } else {
-      prepared.kernel = source->kernel(prepared.scene->medium->medium->channels());
-      prepared.reason = why_not(cell, *prepared.scene, *prepared.kernel);
+      prepared.kernel = source->kernel(prepared.scene->medium->medium->channels(), cell.precision);
+      prepared.reason = why_not(cell, *prepared.scene, prepared.kernel.get());
     }
     if (prepared.reason.empty())
       prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity, cell.reference);
@@ -119,14 +119,39 @@ class Workshop {
                                                                : SampleRange::non_negative;
   }
 
-  static std::string why_not(const Cell& cell, const Scene& scene, const Kernel& kernel) {
+  static std::string why_not(const Cell& cell, const Scene& scene, const Kernel* made) {
+    const int channels = scene.medium->medium->channels();
+    if (!made)
+      return fmt::format("{} has no form in {} for {} channel{}", cell.estimator.type, to_string(cell.precision), channels,
+                         channels == 1 ? "" : "s");
+    const Kernel& kernel = *made;
     if (!kernel.answers(cell.quantity))
-      return fmt::format("{} does not answer {}", cell.estimator.type, to_string(cell.quantity));
+      return fmt::format("{} does not answer {}{}", cell.estimator.type, to_string(cell.quantity),
+                         cell.precision == Precision::float32 ? " in float" : "");
+    if (cell.precision == Precision::float32 && deepest_majorant(scene) > kDeepestSingle)
+      return fmt::format("rays of majorant depth {:.3g} leave float no digits for a flight; expected at most {}, or \"double\"",
+                         deepest_majorant(scene), kDeepestSingle);
     if (kernel.needs_knots() && !scene.medium->medium->polynomial_degree())
       return "no exact traversal: the medium is not polynomial between knots";
     if (kernel.needs_optical_depth() && scene.reference->method != "closed_form")
       return "the medium has no closed-form optical depth";
     return "";
+  }
+
+  /// Flights in float are told to 2^-24 of the ray's depth: here still a thousandth of a mean free path.
+  static constexpr Real kDeepestSingle = 1 << 14;
+
+  static Real deepest_majorant(const Scene& scene) {
+    Real deepest = 0;
+    SegmentBuffer buffer;
+    for (std::size_t ray = 0; ray < scene.rays->world.size(); ++ray) {
+      scene.majorant->structure->segments(scene.rays->world[ray], scene.rays->local[ray], buffer);
+      Real depth = 0;
+      for (const Segment& segment : buffer.segments)
+        depth += segment.majorant > 0 ? segment.majorant * (segment.end - segment.begin) : 0;
+      deepest = std::max(deepest, depth);
+    }
+    return deepest;
   }
 
   template <class Key, class Value, class Make>

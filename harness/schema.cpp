@@ -107,16 +107,18 @@ Json definitions() {
       closed_object({{"clamp", described({{"type", "boolean"}, {"default", false}}, "every sample to [0,1]")},
                      {"quantise_bits", described({{"type", "integer"}, {"minimum", 0}, {"maximum", 31}, {"default", 0}},
                                                  "every sample to the nearest multiple of 1/(2^n - 1); 0: not at all")}});
-  const Json axes = {{"estimator", reference("estimator")},
-                     {"medium", reference("medium")},
-                     {"majorant", described(reference("majorant"), "\"global\" where left out")},
-                     {"rays", reference("rays")},
-                     {"quantity", quantity},
-                     {"samples_per_ray", whole(1)},
-                     {"equal_lookups", described(positive(), "samples_per_ray = this over the expected lookups per sample")},
-                     {"seed", whole(0)},
-                     {"measurement", measurement},
-                     {"transport", transport_schema()}};
+  const Json axes = {
+      {"estimator", reference("estimator")},
+      {"medium", reference("medium")},
+      {"majorant", described(reference("majorant"), "\"global\" where left out")},
+      {"rays", reference("rays")},
+      {"quantity", quantity},
+      {"samples_per_ray", whole(1)},
+      {"equal_lookups", described(positive(), "samples_per_ray = this over the expected lookups per sample")},
+      {"seed", whole(0)},
+      {"precision", described({{"enum", precision_names()}}, "numbers that walks are made of; \"double\" where left out")},
+      {"measurement", measurement},
+      {"transport", transport_schema()}};
   Json cell = axes, matrix = Json::object(), pattern = Json::object();
   for (const auto& [axis, schema] : axes.items()) {
     matrix[axis] = one_or_list(schema);
@@ -210,6 +212,7 @@ Json cell_schema() {
        {"majorant", majorant_schema()},
        {"ray_set", typed_schema()},
        {"quantity", {{"enum", quantity_names()}}},
+       {"precision", {{"enum", precision_names()}}},
        {"channels", {{"type", "integer"}, {"minimum", 1}, {"maximum", kMaxChannels}}},
        {"outputs", described(list_of(text), "what each entry of the statistics is, where not a channel")},
        {"effects", list_of(text)},

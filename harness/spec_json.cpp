@@ -27,6 +27,7 @@ Json deciding_json(const Plan& plan, const Cell& cell) {
                {"quantity", to_string(cell.quantity)},
                {"measurement", measurement_json(cell.measurement)}};
   if (cell.transport != TransportSpec{}) json["transport"] = transport_json(cell.transport);
+  if (cell.precision != Precision::float64) json["precision"] = to_string(cell.precision);
   add_samples(json, cell);
   json["seed"] = cell.seed;
   json["own_streams"] = cell.own_streams;

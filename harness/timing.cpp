@@ -1,11 +1,15 @@
 #include "harness/timing.h"
 
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "harness/calibration.h"
+#include "harness/names.h"
+#include "media/volume.h"
 
 namespace nullmark {
 namespace {
@@ -57,6 +61,23 @@ class Collector final : public benchmark::BenchmarkReporter {
   std::size_t expected_, seen_ = 0;
 };
 
+/// Names of the floors among the benchmarks.
+std::string floor_name(Precision precision) { return "floor/" + to_string(precision); }
+std::string memory_name(std::size_t bytes) { return fmt::format("memory/{}", bytes); }
+
+template <class T>
+void time_lane_floor(benchmark::State& state, std::uint64_t steps) {
+  auto streams = LaneRng<T, kNativeLanes<T>>::seeded({1, 2, 3});
+  volatile Real rate = 0.2;
+  for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(lane_floor_loop<T>(streams, rate, steps));
+}
+
+/// Memory of a volume's voxels; 0 for other media.
+std::size_t voxel_bytes(const Medium& medium) {
+  const auto* volume = dynamic_cast<const Volume*>(&medium);
+  return volume ? volume->data().values.bytes() : 0;
+}
+
 /// Leaves Google Benchmark altogether: 1.7 aborts when a benchmark is skipped in one of several interleaved repetitions.
 struct Interrupted {};
 
@@ -105,15 +126,27 @@ std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& 
   const auto configure = [&](benchmark::internal::Benchmark* bench) {
     bench->Repetitions(plan.repetitions)->MinTime(plan.seconds)->UseRealTime()->Unit(benchmark::kNanosecond);
   };
-  const std::string floor_name = "floor", loop_name = "loop";
-  configure(benchmark::RegisterBenchmark(floor_name.c_str(), [](benchmark::State& state) {
-    PlainRng rng(1);
-    constexpr std::uint64_t kSteps = 4096;
-    volatile Real rate = 0.2;
-    for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(floor_loop(rng, rate, kSteps));
-    state.counters["samples"] = static_cast<double>(state.iterations());
-    state.counters["lookups"] = static_cast<double>(static_cast<std::uint64_t>(state.iterations()) * kSteps);
-  }));
+  const std::string loop_name = "loop";
+  std::size_t extra = 1;
+  const auto add_floor = [&](const std::string& name, auto run) {
+    ++extra;
+    configure(benchmark::RegisterBenchmark(name.c_str(), [run](benchmark::State& state) {
+      constexpr std::uint64_t kSteps = 4096;
+      run(state, kSteps);
+      state.counters["samples"] = static_cast<double>(state.iterations());
+      state.counters["lookups"] = static_cast<double>(static_cast<std::uint64_t>(state.iterations()) * kSteps);
+    }));
+  };
+  add_floor(floor_name(Precision::float64), time_lane_floor<Real>);
+  add_floor(floor_name(Precision::float32), time_lane_floor<float>);
+  std::set<std::size_t> sizes;
+  for (const TimedCell& cell : cells)
+    if (const std::size_t bytes = voxel_bytes(*cell.scene->medium->medium); bytes > 0 && sizes.insert(bytes).second)
+      add_floor(memory_name(bytes), [bytes](benchmark::State& state, std::uint64_t steps) {
+        const std::vector<float> buffer(bytes / sizeof(float), 1.f);
+        std::uint64_t at = 0;
+        for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(memory_floor_loop(buffer, at, steps));
+      });
   configure(benchmark::RegisterBenchmark(loop_name.c_str(), [](benchmark::State& state) {
     PlainRng rng(2);
     std::uint64_t lookups = 0, samples = 0;
@@ -135,7 +168,7 @@ std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& 
       run_cell(state, cells[i], rays, plan.samples_per_traversal, stop);
     }));
   }
-  Collector collector(progress, (cells.size() + 2) * static_cast<std::size_t>(plan.repetitions));
+  Collector collector(progress, (cells.size() + extra) * static_cast<std::size_t>(plan.repetitions));
   try {
     benchmark::RunSpecifiedBenchmarks(&collector);
   } catch (const Interrupted&) {
@@ -148,7 +181,7 @@ std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& 
     for (const Repetition& repetition : collector.all[name]) ns.push_back(repetition.ns_per_iteration / repetition.lookups);
     return ns.empty() ? 0 : median(ns);
   };
-  const Real floor = per_lookup(floor_name), loop = per_lookup(loop_name);
+  const Real loop = per_lookup(loop_name);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const std::vector<Repetition>& repetitions = collector.all[std::to_string(i)];
     if (repetitions.size() != static_cast<std::size_t>(plan.repetitions)) continue;
@@ -164,8 +197,11 @@ std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& 
     time.mad = median(deviation);
     if (!lookup_ns.empty()) {
       time.ns_per_lookup = median(lookup_ns);
-      time.floor_ratio = floor > 0 ? time.ns_per_lookup / floor : 0;
-      time.loop_ratio = loop > 0 ? time.ns_per_lookup / loop : 0;
+      const auto ratio = [&](Real to) { return to > 0 ? time.ns_per_lookup / to : 0; };
+      time.floor_ratio = ratio(per_lookup(floor_name(cells[i].cell->precision)));
+      time.loop_ratio = ratio(loop);
+      if (const std::size_t bytes = voxel_bytes(*cells[i].scene->medium->medium); bytes > 0)
+        time.memory_ratio = ratio(per_lookup(memory_name(bytes)));
     }
     time.repetitions = plan.repetitions;
     time.samples_per_traversal = plan.samples_per_traversal;

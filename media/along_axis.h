@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "media/field.h"
+#include "media/lanes.h"
 
 namespace nullmark {
 
@@ -23,8 +24,8 @@ inline std::pair<Real, Real> outward(std::pair<Real, Real> bounds) {
 /// A grey medium mu(p) = scale * f(s) that varies along one axis of a box, s = (p[axis] - lo) / (hi - lo) in [0,1].
 ///
 /// `Profile` has `Real value(Real s)` = f(s) >= 0, `Real integral(Real a, Real b)` = int_a^b f ds for a < b in closed form and
-/// relatively accurate however close a and b are, `std::pair<Real, Real> extrema(Real a, Real b)`, and where they exist `void
-/// values(Real* s, std::size_t n)` (in place, for a block), `void
+/// relatively accurate however close a and b are, `std::pair<Real, Real> extrema(Real a, Real b)`, and where they exist `value`
+/// as a template over Real and Lanes, `void
 /// knots(std::vector<Real>& s)`, `int polynomial_degree()`, `prepare()`, `Real fraction_at(Real a, Real b, Real mean)`: the x of
 /// int_0^x f(a + (b - a) y) dy = mean, for b on either side of a, where it is below 1. With `optical_depth` tau > 0, scale = tau
 /// / (int_0^1 f ds * (hi - lo)): the axis then has the transmittance e^-tau whatever the profile's own amplitude; otherwise scale
@@ -68,20 +69,21 @@ struct AlongAxis {
 
   Box bounds() const { return {lo, hi}; }
 
-  Real coordinate(Real x) const { return std::min<Real>(1, std::max<Real>(0, (x - lo[axis]) * inverse_extent)); }
+  template <class X>
+  X coordinate(const X& x) const {
+    return smaller(1, larger(0, (x - lo[axis]) * inverse_extent));
+  }
 
   Real extinction(const Vec3& p) const { return scale * profile.value(coordinate(p[axis])); }
 
   /// The axis is chosen once for the block.
-  void extinction(const Points& points, Real* out) const {
-    const Real* x = axis == 0 ? points.x : axis == 1 ? points.y : points.z;
-    if constexpr (requires { profile.values(out, points.size); }) {
-      for (std::size_t i = 0; i < points.size; ++i) out[i] = coordinate(x[i]);
-      profile.values(out, points.size);
-      for (std::size_t i = 0; i < points.size; ++i) out[i] *= scale;
-    } else {
-      for (std::size_t i = 0; i < points.size; ++i) out[i] = scale * profile.value(coordinate(x[i]));
-    }
+  template <class T>
+  void extinction(const BasicPoints<T>& points, T* out) const {
+    const T* x = axis == 0 ? points.x : axis == 1 ? points.y : points.z;
+    if constexpr (requires(Lanes<T, 1> s) { profile.value(s); })
+      map_lanes(x, points.size, out, [this](auto lanes) { return scale * profile.value(coordinate(lanes)); });
+    else
+      for (std::size_t i = 0; i < points.size; ++i) out[i] = static_cast<T>(scale * profile.value(coordinate(Real{x[i]})));
   }
 
   Extrema extrema(const Box& box) const {

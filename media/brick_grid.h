@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "media/types.h"
+#include "media/lanes.h"
 
 namespace nullmark {
 
@@ -92,6 +92,13 @@ class BrickGrid {
   /// Interpolation, in double precision, between the 8 voxels around a point.
   Real trilinear(Real x, Real y, Real z) const;
 
+  /// The same for many points at once, in the precision of T: in double bit for bit the same.  Only where `fits_lanes()`.
+  template <class T, std::size_t N>
+  Lanes<T, N> trilinear(Lanes<T, N> x, Lanes<T, N> y, Lanes<T, N> z) const;
+
+  /// Whether 32-bit indices reach all values.
+  bool fits_lanes() const { return values_.size() <= std::size_t{INT_MAX}; }
+
   /// Extremes over a range, and the average sum w value / weight with w = weights(axis, index) multiplied over the axes,
   /// 0 <= w <= 1; `weight` is the sum of w over the whole range.
   template <class Weights>
@@ -161,6 +168,46 @@ inline Real BrickGrid::trilinear(Real x, Real y, Real z) const {
   const auto edge = [&](const float* at) { return mix(at[0], at[1], fz); };
   const auto face = [&](const float* at) { return mix(edge(at), edge(at + kSteps[1]), fy); };
   return mix(face(v), face(v + kSteps[0]), fx);
+}
+
+template <class T, std::size_t N>
+Lanes<T, N> BrickGrid::trilinear(Lanes<T, N> x, Lanes<T, N> y, Lanes<T, N> z) const {
+  using Pack = Lanes<T, N>;
+  if (table_.empty()) return Pack(background_);
+  const hn::FixedTag<std::int32_t, N> integers;
+  const hn::FixedTag<float, N> singles;
+  const auto covered = [&](Pack at, std::size_t axis) { return (!(at < Pack(table_lo_[axis]))) & (at < Pack(table_hi_[axis])); };
+  const LaneMask<T, N> inside = covered(x, 0) & covered(y, 1) & covered(z, 2);
+  // Points outside look up the table's first voxel, in vain.
+  const auto index = [&](Pack& at, std::size_t axis) {
+    const Pack floor = rounded_down(at);
+    at = at - floor;
+    const Pack from_corner = select(inside, floor - Pack(table_lo_[axis]), Pack(0));
+    if constexpr (sizeof(T) == sizeof(float))
+      return hn::ConvertTo(integers, from_corner.vector());
+    else
+      return hn::DemoteTo(integers, from_corner.vector());
+  };
+  const auto number = [&](std::size_t n) { return hn::Set(integers, static_cast<std::int32_t>(n)); };
+  const auto u = index(x, 0), v = index(y, 1), w = index(z, 2);
+  const auto of_brick = [&](auto i) { return hn::ShiftRight<3>(i); };
+  const auto in_brick = [&](auto i) { return hn::And(i, number(kSide - 1)); };
+  const auto row = hn::Add(hn::Mul(of_brick(u), number(shape_[1])), of_brick(v));
+  const auto cell = hn::Add(hn::Mul(row, number(shape_[2])), of_brick(w));
+  const auto brick = hn::GatherIndex(integers, reinterpret_cast<const std::int32_t*>(table_.data()), cell);
+  const auto line = hn::Add(hn::Mul(in_brick(u), number(kStride)), in_brick(v));
+  const auto corner = hn::Add(hn::Mul(brick, number(kBrickValues)), hn::Add(hn::Mul(line, number(kStride)), in_brick(w)));
+  const auto voxel = [&](int step) -> Pack {
+    const auto value = hn::GatherIndex(singles, values_.data() + step, corner);
+    if constexpr (sizeof(T) == sizeof(float))
+      return value;
+    else
+      return hn::PromoteTo(hn::FixedTag<double, N>(), value);
+  };
+  const auto mix = [](Pack a, Pack b, Pack f) { return a + (b - a) * f; };
+  const auto edge = [&](int step) { return mix(voxel(step), voxel(step + 1), z); };
+  const auto face = [&](int step) { return mix(edge(step), edge(step + kSteps[1]), y); };
+  return select(inside, mix(face(0), face(kSteps[0]), x), Pack(background_));
 }
 
 template <class Fill, class ForEach>

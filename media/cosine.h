@@ -21,7 +21,10 @@ struct CosineProfile {
   }
 
   // 1 + cos x = 2 cos^2(x/2) keeps relative accuracy where f touches zero.
-  Real value(Real s) const { return from_half_angle((frequency * s + phase) / 2); }
+  template <class S>
+  S value(const S& s) const {
+    return from_half_angle((frequency * s + phase) / 2);
+  }
 
   // (b - a) (1 + cos(middle) sinc(y)), y half the angle between the ends, again as a sum of terms that do not cancel.
   Real integral(Real a, Real b) const {
@@ -51,7 +54,10 @@ struct CosineProfile {
   }
 
  private:
-  static Real from_half_angle(Real x) { return 2 * std::cos(x) * std::cos(x); }
+  template <class S>
+  static S from_half_angle(const S& x) {
+    return 2 * cosine(x) * cosine(x);
+  }
 
   static Real one_minus_sinc(Real y) {
     if (std::abs(y) > 1) return 1 - std::sin(y) / y;

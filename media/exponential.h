@@ -18,7 +18,10 @@ struct ExponentialProfile {
     visit.number("rate", rate, Range::between(-700, 700), "", "logarithm of the ratio of upper to lower face");
   }
 
-  Real value(Real s) const { return amplitude * std::exp(rate * s); }
+  template <class S>
+  S value(const S& s) const {
+    return amplitude * exponential(rate * s);
+  }
 
   Real integral(Real a, Real b) const {
     const Real growth = rate * (b - a);

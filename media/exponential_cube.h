@@ -1,7 +1,6 @@
 #pragma once
 
 #include "media/along_axis.h"
-#include "media/logarithm.h"
 
 namespace nullmark {
 
@@ -25,12 +24,13 @@ struct ExponentialCubeProfile {
     if (!(x1 > 0 && x1 <= 1)) throw ParameterError("x1", "x1 = " + std::to_string(x1) + "; expected 0 < x1 <= 1");
   }
 
-  Real x(Real s) const { return std::min<Real>(1, std::max<Real>(0, x0 + s * (x1 - x0))); }
-  Real value(Real s) const { return -std::log(std::max(kTiny, x(s))) + Real{0}; }
-
-  void values(Real* s, std::size_t n) const {
-    for (std::size_t i = 0; i < n; ++i) s[i] = std::max(kTiny, x(s[i]));
-    negative_logarithms(s, n, s);
+  template <class S>
+  S x(const S& s) const {
+    return smaller(1, larger(0, x0 + s * (x1 - x0)));
+  }
+  template <class S>
+  S value(const S& s) const {
+    return negative_logarithm(larger(S(least_normal(s)), x(s))) + 0;
   }
 
   // With y = (u - v) / v the mean of -ln over [v, u] is -ln u + 1 - ln(1 + y) / y: nothing cancels as v -> u.
@@ -44,7 +44,7 @@ struct ExponentialCubeProfile {
 
   std::pair<Real, Real> extrema(Real a, Real b) const {
     const auto [minimum, maximum] = outward(std::minmax({value(a), value(b)}));
-    return {minimum, std::min(x(a), x(b)) < kTiny ? kInfinity : maximum};
+    return {minimum, std::min(x(a), x(b)) < least_normal(x(a)) ? kInfinity : maximum};
   }
 
   // Halving x towards the logarithm's singularity keeps every piece smooth; what is left below 2^-64 weighs nothing.
@@ -55,9 +55,6 @@ struct ExponentialCubeProfile {
       if (knot > 0 && knot < 1) s.push_back(knot);
     }
   }
-
- private:
-  static constexpr Real kTiny = std::numeric_limits<Real>::min();
 };
 
 using ExponentialCube = AlongAxis<ExponentialCubeProfile>;

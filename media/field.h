@@ -25,7 +25,8 @@ inline void append_planes(const Ray& ray, int axis, Real lo, Real hi, int n, std
   for (int i = first; i <= last; ++i) append_crossing(ray, axis, lo + (hi - lo) * i / n, t);
 }
 
-/// A grey medium from a plain struct: the author writes `Real extinction(const Vec3&) const`, `Extrema extrema(const Box&)
+/// A grey medium from a plain struct: the author writes `Real extinction(const Vec3&) const` (or, for blocks, `template <class T>
+/// void extinction(const BasicPoints<T>&, T* out) const`), `Extrema extrema(const Box&)
 /// const`, `Box bounds() const`, and where they exist `void knots(const Ray&, std::vector<Real>&) const`, `int
 /// polynomial_degree() const`, `std::optional<Real> optical_depth(const Ray&) const`, `std::optional<Real>
 /// distance_at_depth(const Ray&, Real depth) const`; this adaptor makes the block loop with the lookup inlined.
@@ -41,6 +42,13 @@ class FieldMedium final : public Medium {
       field_.extinction(points, out);
     else
       for (std::size_t i = 0; i < points.size; ++i) out[i] = field_.extinction(points[i]);
+  }
+
+  void extinction(const SinglePoints& points, float* out) const override {
+    if constexpr (requires { field_.extinction(points, out); })
+      field_.extinction(points, out);
+    else
+      Medium::extinction(points, out);
   }
 
   Extrema extrema(const Box& box) const override {

@@ -16,8 +16,14 @@ struct Bell {
   }
 
   /// (s - center) / (sqrt(2) sigma); the bell is exp(-z^2), 1 minus it is -expm1(-z^2).
-  Real z(Real s) const { return (s - center) / (sigma * std::numbers::sqrt2); }
-  Real value(Real s) const { return std::exp(-z(s) * z(s)); }
+  template <class S>
+  S z(const S& s) const {
+    return (s - center) / (sigma * std::numbers::sqrt2);
+  }
+  template <class S>
+  S value(const S& s) const {
+    return exponential(-z(s) * z(s));
+  }
 
   /// A stretch so short that z^2 changes by less than 4 over it: differences of erf would cancel, a 15-point rule is exact.
   bool is_short(Real a, Real b) const {
@@ -65,7 +71,10 @@ struct GaussianBumpProfile {
     bell.parameters(visit);
   }
 
-  Real value(Real s) const { return amplitude * bell.value(s); }
+  template <class S>
+  S value(const S& s) const {
+    return amplitude * bell.value(s);
+  }
   Real integral(Real a, Real b) const { return amplitude * bell.integral(a, b); }
   std::pair<Real, Real> extrema(Real a, Real b) const {
     const auto [minimum, maximum] = bell.extrema(a, b);

@@ -27,7 +27,10 @@ struct GaussianHoleProfile {
   }
 
   // Written as rest + depth (1 - bell): with depth = level no cancellation where f touches zero.
-  Real value(Real s) const { return (level - depth) + depth * complement(s); }
+  template <class S>
+  S value(const S& s) const {
+    return (level - depth) + depth * complement(s);
+  }
 
   Real integral(Real a, Real b) const {
     const Real filled =
@@ -43,7 +46,10 @@ struct GaussianHoleProfile {
   void knots(std::vector<Real>& s) const { bell.knots(s); }
 
  private:
-  Real complement(Real s) const { return -std::expm1(-bell.z(s) * bell.z(s)); }
+  template <class S>
+  S complement(const S& s) const {
+    return one_minus_exponential(-bell.z(s) * bell.z(s));
+  }
 };
 
 using GaussianHole = AlongAxis<GaussianHoleProfile>;

@@ -25,7 +25,10 @@ struct Homogeneous {
   }
 
   Box bounds() const { return {lo, hi}; }
-  Real extinction(const Vec3&) const { return value; }
+  template <class T>
+  void extinction(const BasicPoints<T>& points, T* out) const {
+    std::fill_n(out, points.size, static_cast<T>(value));
+  }
   Extrema extrema(const Box&) const { return Extrema::grey(value, value, value); }
   int polynomial_degree() const { return 0; }
   std::optional<Real> optical_depth(const Ray& ray) const { return value * ray.length(); }

@@ -18,7 +18,10 @@ struct LinearProfile {
     visit.number("end", end, Range::non_negative(), "1/length", "extinction at the upper face");
   }
 
-  Real value(Real s) const { return begin + (end - begin) * s; }
+  template <class S>
+  S value(const S& s) const {
+    return begin + (end - begin) * s;
+  }
   Real integral(Real a, Real b) const { return (b - a) * value((a + b) / 2); }
   std::pair<Real, Real> extrema(Real a, Real b) const { return std::minmax({value(a), value(b)}); }
   int polynomial_degree() const { return 1; }

@@ -12,14 +12,17 @@
 namespace nullmark {
 
 /// n points in a medium's local frame, coordinate by coordinate.
-struct Points {
-  const Real* x = nullptr;
-  const Real* y = nullptr;
-  const Real* z = nullptr;
+template <class T>
+struct BasicPoints {
+  const T* x = nullptr;
+  const T* y = nullptr;
+  const T* z = nullptr;
   std::size_t size = 0;
 
   Vec3 operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
 };
+using Points = BasicPoints<Real>;
+using SinglePoints = BasicPoints<float>;
 
 /// Extinction over a box, per channel, in 1/length.  minimum <= mu <= maximum holds at every point of the box (true bounds, not
 /// estimates); the average may be approximate, since it serves as a control only.
@@ -48,6 +51,9 @@ class Medium {
 
   /// One lookup per point: out[i * channels() + c] = mu_c(points[i]).  Points lie inside `bounds()` up to rounding.
   virtual void extinction(const Points& points, Real* out) const = 0;
+
+  /// The same in single precision, of grey media: by way of double where a medium has nothing better.
+  virtual void extinction(const SinglePoints& points, float* out) const;
 
   /// Bounds and average over a local box (cut to `bounds()`; the vacuum outside is not counted).
   virtual Extrema extrema(const Box& box) const = 0;
@@ -80,5 +86,18 @@ class Medium {
     return out;
   }
 };
+
+inline void Medium::extinction(const SinglePoints& points, float* out) const {
+  constexpr std::size_t kBlock = 256;
+  Real x[kBlock], y[kBlock], z[kBlock], extinction[kBlock];
+  for (std::size_t done = 0; done < points.size; done += kBlock) {
+    const std::size_t n = std::min(kBlock, points.size - done);
+    std::copy_n(points.x + done, n, x);
+    std::copy_n(points.y + done, n, y);
+    std::copy_n(points.z + done, n, z);
+    this->extinction(Points{x, y, z, n}, extinction);
+    for (std::size_t i = 0; i < n; ++i) out[done + i] = static_cast<float>(extinction[i]);
+  }
+}
 
 }  // namespace nullmark

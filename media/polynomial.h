@@ -41,7 +41,10 @@ struct PolynomialProfile {
     }
   }
 
-  Real value(Real s) const { return std::max<Real>(0, horner(s)); }
+  template <class S>
+  S value(const S& s) const {
+    return larger(0, horner(s));
+  }
 
   // Two-point Gauss is exact for cubics, and unlike a difference of antiderivatives it does not cancel as b -> a.
   Real integral(Real a, Real b) const {
@@ -62,7 +65,10 @@ struct PolynomialProfile {
   int polynomial_degree() const { return static_cast<int>(coefficients.size()) - 1; }
 
  private:
-  Real horner(Real s) const { return c[0] + s * (c[1] + s * (c[2] + s * c[3])); }
+  template <class S>
+  S horner(const S& s) const {
+    return c[0] + s * (c[1] + s * (c[2] + s * c[3]));
+  }
 
   /// Bound on what rounding adds to f; constants and lines are evaluated monotonically and need none.
   Real rounding() const {

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <vector>
+
+#include "media/elementary.h"
 #include "media/types.h"
 
 namespace nullmark {
@@ -50,7 +53,38 @@ inline Real average(const Spectrum& x) { return x.mean(); }
 inline Real magnitude(Real x) { return std::abs(x); }
 inline Spectrum magnitude(const Spectrum& x) { return x.abs(); }
 
-inline Real exponential(Real x) { return std::exp(x); }
 inline Spectrum exponential(const Spectrum& x) { return x.exp(); }
+
+/// What one sample's distance, and its yes or no, are beside a Value: plain for grey and chromatic walks, and as many as there
+/// are lanes for walks in lanes.h.
+template <class Value>
+struct Walking {
+  using Distance = Real;
+  using Truth = bool;
+};
+template <class Value>
+using Distance = typename Walking<Value>::Distance;
+template <class Value>
+using Truth = typename Walking<Value>::Truth;
+
+/// `a` where `yes`, else `b`.
+inline Real select(bool yes, Real a, Real b) { return yes ? a : b; }
+template <class Condition>
+Spectrum select(const Eigen::ArrayBase<Condition>& yes, const Spectrum& a, const Spectrum& b) {
+  return yes.select(a, b);
+}
+
+inline Spectrum larger(const Spectrum& x, Real least) { return x.max(least); }
+
+inline bool none(bool x) { return !x; }
+
+template <class Value>
+const Value& entry(const std::vector<Value>& table, std::size_t i) {
+  return table[i];
+}
+
+/// Whether every channel is 0.
+inline bool vanished(Real x) { return x == 0; }
+inline bool vanished(const Spectrum& x) { return (x == 0).all(); }
 
 }  // namespace nullmark

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "harness/block_kernel.h"
+#include "harness/estimator_template.h"
 
 namespace nullmark {
 
@@ -51,7 +51,10 @@ class WrappedSource final : public EstimatorSource {
   bool needs_bound() const override { return honest_.needs_bound(); }
   std::optional<Real> order(Quantity quantity) const override { return honest_.order(quantity); }
   void check(const Extrema& medium) const override { honest_.check(medium); }
-  std::unique_ptr<const Kernel> kernel(int channels) const override { return bug_.wrap(honest_.kernel(channels)); }
+  std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64) const override {
+    auto honest = honest_.kernel(channels, precision);
+    return honest ? bug_.wrap(std::move(honest)) : nullptr;
+  }
 
  private:
   Bug<Real> bug_;
