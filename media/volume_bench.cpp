@@ -7,17 +7,13 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
-#include <filesystem>
-
-#include "estimators/ratio.h"
 #include "harness/bench_kernel.h"
 #include "harness/calibration.h"
-#include "media/vdb_writer.h"
+#include "media/bench_volume.h"
 
 namespace nullmark {
 namespace {
 
-constexpr int kResolution = 128;
 constexpr Real kExtinction = 20;
 
 /// The procedural volume, once as a file's grid, once through the project's reader, once as a dense array.
@@ -51,13 +47,10 @@ struct Fixture {
  private:
   Fixture() {
     openvdb::initialize();
-    const std::string path = (std::filesystem::temp_directory_path() / "nullmark_volume_bench.vdb").string();
-    write_procedural_vdb(path, {.resolution = kResolution});
-    data = std::make_shared<VolumeData>(read_vdb(path, "density"));
-    openvdb::io::File file(path);
+    data = std::make_shared<VolumeData>(read_vdb(bench_volume_file(), "density"));
+    openvdb::io::File file(bench_volume_file());
     file.open();
     grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("density"));
-    std::filesystem::remove(path);
     nano = nanovdb::openToNanoVDB(*grid);
     const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
     lo = box.min().offsetBy(-2);
@@ -76,46 +69,119 @@ struct Fixture {
   static Ray world_ray() { return {{-2, -1.7, -1.6}, Vec3(2, 1.75, 1.62).normalized(), 0, kInfinity}; }
 };
 
-/// The hand-written loop on the same ray: distances in units of the ray's length.
-template <class Value>
-void hand_loop(benchmark::State& state, const Value& value) {
-  const Fixture& fixture = Fixture::instance();
-  const Ray ray = fixture.local;
+template <class Filter>
+std::shared_ptr<const Medium> volume() {
+  return std::make_shared<FilteredVolume<Filter>>(Fixture::instance().data, kExtinction);
+}
+
+// Hand-written readers of the voxels: functions of a point.
+
+auto nanovdb_reader(const auto& sampler) {
+  return [&](const Vec3& p) { return static_cast<Real>(sampler(nanovdb::Vec3d(p.x(), p.y(), p.z()))); };
+}
+
+template <class Sampler>
+auto openvdb_reader(const auto& accessor) {
+  return [&](const Vec3& p) { return static_cast<Real>(Sampler::sample(accessor, openvdb::Vec3d(p.x(), p.y(), p.z()))); };
+}
+
+auto dense_reader() {
+  return [&fixture = Fixture::instance()](const Vec3& p) { return fixture.dense_trilinear(p.x(), p.y(), p.z()); };
+}
+
+// Flattened, or readers that are used twice are called instead of inlined, and the baselines slower than need be.
+
+/// Ratio tracking by hand along the ray: distances in units of the ray's length.
+[[gnu::flatten]] void walk(benchmark::State& state, const auto& value) {
+  const Ray ray = Fixture::instance().local;
   PlainRng rng(1);
-  std::uint64_t lookups = 0;
+  std::uint64_t lookups = 0, samples = 0;
   const Real length = ray.length(), majorant = kExtinction * length;
-  for ([[maybe_unused]] auto _ : state)
+  for ([[maybe_unused]] auto _ : state) {
     for (int i = 0; i < 64; ++i)
       benchmark::DoNotOptimize(plain_ratio_loop(
           rng, majorant, [&](Real s) { return majorant * value(Vec3(ray.at(ray.begin + s * length))); }, lookups));
-  state.counters["items"] = static_cast<double>(lookups);
+    samples += 64;
+  }
+  count_items(state, "sample", samples);
+  count_lookups(state, lookups);
 }
 
-[[maybe_unused]] const bool kRegistered = [] {
-  const std::string group = "ratio tracking, trilinear volume, global majorant";
-  benchmark::RegisterBenchmark((group + "/0 NanoVDB ReadAccessor, hand loop").c_str(), [](benchmark::State& state) {
-    const auto* grid = Fixture::instance().nano.grid<float>();
-    const auto accessor = grid->getAccessor();
-    const auto sampler = nanovdb::createSampler<1>(accessor);
-    hand_loop(state, [&](const Vec3& p) { return static_cast<Real>(sampler(nanovdb::Vec3d(p.x(), p.y(), p.z()))); });
+/// Points as a block of walks asks for them: scattered along the ray.
+struct RandomPoints {
+  RandomPoints() {
+    const Ray ray = Fixture::instance().local;
+    PlainRng rng(1);
+    for (int i = 0; i < 4096; ++i) {
+      const Vec3 p = ray.at(ray.begin + rng.uniform() * ray.length());
+      x.push_back(p.x()), y.push_back(p.y()), z.push_back(p.z());
+    }
+  }
+  std::vector<Real> x, y, z;
+};
+
+[[gnu::flatten]] void look_up(benchmark::State& state, const auto& value) {
+  const RandomPoints points;
+  std::vector<Real> out(points.x.size());
+  std::uint64_t lookups = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = kExtinction * value(Vec3(points.x[i], points.y[i], points.z[i]));
+    benchmark::DoNotOptimize(out.data());
+    benchmark::ClobberMemory();
+    lookups += out.size();
+  }
+  count_items(state, "point", lookups);
+}
+
+void look_up_in_blocks(benchmark::State& state, const Medium& medium) {
+  constexpr std::size_t kBlock = 256;
+  const RandomPoints points;
+  std::vector<Real> out(kBlock);
+  std::uint64_t lookups = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    const std::size_t first = lookups % points.x.size();
+    medium.extinction({&points.x[first], &points.y[first], &points.z[first], kBlock}, out.data());
+    benchmark::DoNotOptimize(out.data());
+    benchmark::ClobberMemory();
+    lookups += kBlock;
+  }
+  count_items(state, "point", lookups);
+}
+
+template <int order>
+void with_nanovdb(benchmark::State& state, bool walks) {
+  const auto accessor = Fixture::instance().nano.grid<float>()->getAccessor();
+  const auto sampler = nanovdb::createSampler<order>(accessor);
+  walks ? walk(state, nanovdb_reader(sampler)) : look_up(state, nanovdb_reader(sampler));
+}
+
+template <class Sampler>
+void with_openvdb(benchmark::State& state, bool walks) {
+  const auto accessor = Fixture::instance().grid->getConstAccessor();
+  walks ? walk(state, openvdb_reader<Sampler>(accessor)) : look_up(state, openvdb_reader<Sampler>(accessor));
+}
+
+[[maybe_unused]] const BenchmarkGroup kGroup([] {
+  using benchmark::State;
+  using openvdb::tools::BoxSampler, openvdb::tools::PointSampler;
+  const auto add = [](const std::string& name, auto function) { benchmark::RegisterBenchmark(name.c_str(), function); };
+  const std::string walks = "ratio tracking, trilinear volume, global majorant/", smooth = "trilinear lookup along a ray/",
+                    voxels = "nearest lookup along a ray/";
+  add(walks + "0 NanoVDB ReadAccessor, hand-written", [](State& state) { with_nanovdb<1>(state, true); });
+  add(walks + "dense array, hand-written", [](State& state) { walk(state, dense_reader()); });
+  add(walks + "OpenVDB GridSampler, hand-written", [](State& state) { with_openvdb<BoxSampler>(state, true); });
+  add(walks + "nullmark, ratio", [](State& state) {
+    run_kernel_bench(state, KernelBench({"ratio", {}, {}, {}}, volume<TrilinearFilter>(),
+                                        {"prescribed", {{"value", kExtinction}}, {}, {}}, Fixture::world_ray()));
   });
-  benchmark::RegisterBenchmark((group + "/dense array, hand loop").c_str(), [](benchmark::State& state) {
-    const Fixture& fixture = Fixture::instance();
-    hand_loop(state, [&](const Vec3& p) { return fixture.dense_trilinear(p.x(), p.y(), p.z()); });
-  });
-  benchmark::RegisterBenchmark((group + "/OpenVDB GridSampler, hand loop").c_str(), [](benchmark::State& state) {
-    const auto accessor = Fixture::instance().grid->getConstAccessor();
-    using Sampler = openvdb::tools::BoxSampler;
-    hand_loop(state, [&](const Vec3& p) {
-      return static_cast<Real>(Sampler::sample(accessor, openvdb::Vec3d(p.x(), p.y(), p.z())));
-    });
-  });
-  benchmark::RegisterBenchmark((group + "/nullmark, ratio").c_str(), [](benchmark::State& state) {
-    const auto medium = std::make_shared<FilteredVolume<TrilinearFilter>>(Fixture::instance().data, kExtinction);
-    run_kernel_bench<RatioTracking>(state, medium, kExtinction, Fixture::world_ray());
-  });
-  return true;
-}();
+  add(smooth + "0 NanoVDB ReadAccessor", [](State& state) { with_nanovdb<1>(state, false); });
+  add(smooth + "dense array", [](State& state) { look_up(state, dense_reader()); });
+  add(smooth + "OpenVDB GridSampler", [](State& state) { with_openvdb<BoxSampler>(state, false); });
+  add(smooth + "nullmark, blocks of 256", [](State& state) { look_up_in_blocks(state, *volume<TrilinearFilter>()); });
+  add(voxels + "0 NanoVDB ReadAccessor", [](State& state) { with_nanovdb<0>(state, false); });
+  add(voxels + "OpenVDB GridSampler", [](State& state) { with_openvdb<PointSampler>(state, false); });
+  add(voxels + "nullmark, blocks of 256", [](State& state) { look_up_in_blocks(state, *volume<NearestFilter>()); });
+});
 
 }  // namespace
 }  // namespace nullmark
