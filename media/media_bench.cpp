@@ -4,7 +4,7 @@
 #include "harness/calibration.h"
 #include "harness/parameter_values.h"
 #include "harness/scene.h"
-#include "media/bench_volume.h"
+#include "media/example_media.h"
 
 namespace nullmark {
 namespace {
@@ -62,11 +62,11 @@ void add(const std::string& name, const std::shared_ptr<const Medium>& medium) {
 [[maybe_unused]] const BenchmarkGroup kGroup([] {
   benchmark::RegisterBenchmark("lookup in blocks of 256 points/0 Gaussian, hand-written", plain_gaussian);
   for (const ComponentInfo& entry : registered(ComponentKind::medium))
-    add(entry.name, make_medium(bench_medium(entry.name))->build());
+    add(entry.name, make_medium(example_medium(entry.name))->build());
 
   const auto field = [](const char* type) {
     MediumSpec spec;
-    spec.field = bench_medium(type);
+    spec.field = example_medium(type);
     return spec;
   };
   const auto made_of = [&](const char* type, std::vector<const char*> parts) {

@@ -9,7 +9,7 @@
 
 #include "harness/bench_kernel.h"
 #include "harness/calibration.h"
-#include "media/bench_volume.h"
+#include "media/example_media.h"
 
 namespace nullmark {
 namespace {
@@ -47,8 +47,8 @@ struct Fixture {
  private:
   Fixture() {
     openvdb::initialize();
-    data = std::make_shared<VolumeData>(read_vdb(bench_volume_file(), "density"));
-    openvdb::io::File file(bench_volume_file());
+    data = std::make_shared<VolumeData>(read_vdb(example_volume_file(), "density"));
+    openvdb::io::File file(example_volume_file());
     file.open();
     grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("density"));
     nano = nanovdb::openToNanoVDB(*grid);

@@ -2,7 +2,7 @@
 
 #include "harness/bench.h"
 #include "harness/scene.h"
-#include "media/bench_volume.h"
+#include "media/example_media.h"
 
 namespace nullmark {
 namespace {
@@ -80,7 +80,7 @@ void add(const std::string& name, const Component& field) {
 
 [[maybe_unused]] const BenchmarkGroup kGroup([] {
   add("fractal noise", {"fractal_noise", {{"peak", 100.}, {"sharpness", 5}}, {}, {}});
-  Component volume = bench_medium("vdb");
+  Component volume = example_medium("vdb");
   volume.values["extinction_per_value"] = 100.;
   add("a volume of 128^3 voxels", volume);
 });
