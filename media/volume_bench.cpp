@@ -69,30 +69,10 @@ struct Fixture {
   static Ray world_ray() { return {{-2, -1.7, -1.6}, Vec3(2, 1.75, 1.62).normalized(), 0, kInfinity}; }
 };
 
-template <class Filter>
-std::shared_ptr<const Medium> volume() {
-  return std::make_shared<FilteredVolume<Filter>>(Fixture::instance().data, kExtinction);
-}
-
-// Hand-written readers of the voxels: functions of a point.
-
-auto nanovdb_reader(const auto& sampler) {
-  return [&](const Vec3& p) { return static_cast<Real>(sampler(nanovdb::Vec3d(p.x(), p.y(), p.z()))); };
-}
-
-template <class Sampler>
-auto openvdb_reader(const auto& accessor) {
-  return [&](const Vec3& p) { return static_cast<Real>(Sampler::sample(accessor, openvdb::Vec3d(p.x(), p.y(), p.z()))); };
-}
-
-auto dense_reader() {
-  return [&fixture = Fixture::instance()](const Vec3& p) { return fixture.dense_trilinear(p.x(), p.y(), p.z()); };
-}
-
-// Flattened, or readers that are used twice are called instead of inlined, and the baselines slower than need be.
-
-/// Ratio tracking by hand along the ray: distances in units of the ray's length.
-[[gnu::flatten]] void walk(benchmark::State& state, const auto& value) {
+/// Ratio tracking by hand along the ray: distances in units of the ray's length.  Each reader of voxels serves one benchmark
+/// only: what is used once is inlined, and a baseline that is not would be slower than need be.
+template <class Reader>
+void walk(benchmark::State& state, const Reader& value) {
   const Ray ray = Fixture::instance().local;
   PlainRng rng(1);
   std::uint64_t lookups = 0, samples = 0;
@@ -107,80 +87,28 @@ auto dense_reader() {
   count_lookups(state, lookups);
 }
 
-/// Points as a block of walks asks for them: scattered along the ray.
-struct RandomPoints {
-  RandomPoints() {
-    const Ray ray = Fixture::instance().local;
-    PlainRng rng(1);
-    for (int i = 0; i < 4096; ++i) {
-      const Vec3 p = ray.at(ray.begin + rng.uniform() * ray.length());
-      x.push_back(p.x()), y.push_back(p.y()), z.push_back(p.z());
-    }
-  }
-  std::vector<Real> x, y, z;
-};
-
-[[gnu::flatten]] void look_up(benchmark::State& state, const auto& value) {
-  const RandomPoints points;
-  std::vector<Real> out(points.x.size());
-  std::uint64_t lookups = 0;
-  for ([[maybe_unused]] auto _ : state) {
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] = kExtinction * value(Vec3(points.x[i], points.y[i], points.z[i]));
-    benchmark::DoNotOptimize(out.data());
-    benchmark::ClobberMemory();
-    lookups += out.size();
-  }
-  count_items(state, "point", lookups);
-}
-
-void look_up_in_blocks(benchmark::State& state, const Medium& medium) {
-  constexpr std::size_t kBlock = 256;
-  const RandomPoints points;
-  std::vector<Real> out(kBlock);
-  std::uint64_t lookups = 0;
-  for ([[maybe_unused]] auto _ : state) {
-    const std::size_t first = lookups % points.x.size();
-    medium.extinction({&points.x[first], &points.y[first], &points.z[first], kBlock}, out.data());
-    benchmark::DoNotOptimize(out.data());
-    benchmark::ClobberMemory();
-    lookups += kBlock;
-  }
-  count_items(state, "point", lookups);
-}
-
-template <int order>
-void with_nanovdb(benchmark::State& state, bool walks) {
-  const auto accessor = Fixture::instance().nano.grid<float>()->getAccessor();
-  const auto sampler = nanovdb::createSampler<order>(accessor);
-  walks ? walk(state, nanovdb_reader(sampler)) : look_up(state, nanovdb_reader(sampler));
-}
-
-template <class Sampler>
-void with_openvdb(benchmark::State& state, bool walks) {
-  const auto accessor = Fixture::instance().grid->getConstAccessor();
-  walks ? walk(state, openvdb_reader<Sampler>(accessor)) : look_up(state, openvdb_reader<Sampler>(accessor));
-}
-
 [[maybe_unused]] const BenchmarkGroup kGroup([] {
-  using benchmark::State;
-  using openvdb::tools::BoxSampler, openvdb::tools::PointSampler;
-  const auto add = [](const std::string& name, auto function) { benchmark::RegisterBenchmark(name.c_str(), function); };
-  const std::string walks = "ratio tracking, trilinear volume, global majorant/", smooth = "trilinear lookup along a ray/",
-                    voxels = "nearest lookup along a ray/";
-  add(walks + "0 NanoVDB ReadAccessor, hand-written", [](State& state) { with_nanovdb<1>(state, true); });
-  add(walks + "dense array, hand-written", [](State& state) { walk(state, dense_reader()); });
-  add(walks + "OpenVDB GridSampler, hand-written", [](State& state) { with_openvdb<BoxSampler>(state, true); });
-  add(walks + "nullmark, ratio", [](State& state) {
-    run_kernel_bench(state, KernelBench({"ratio", {}, {}, {}}, volume<TrilinearFilter>(),
-                                        {"prescribed", {{"value", kExtinction}}, {}, {}}, Fixture::world_ray()));
+  const std::string group = "ratio tracking, trilinear volume, global majorant/";
+  benchmark::RegisterBenchmark((group + "0 NanoVDB ReadAccessor, hand-written").c_str(), [](benchmark::State& state) {
+    const auto* grid = Fixture::instance().nano.grid<float>();
+    const auto accessor = grid->getAccessor();
+    const auto sampler = nanovdb::createSampler<1>(accessor);
+    walk(state, [&](const Vec3& p) { return static_cast<Real>(sampler(nanovdb::Vec3d(p.x(), p.y(), p.z()))); });
   });
-  add(smooth + "0 NanoVDB ReadAccessor", [](State& state) { with_nanovdb<1>(state, false); });
-  add(smooth + "dense array", [](State& state) { look_up(state, dense_reader()); });
-  add(smooth + "OpenVDB GridSampler", [](State& state) { with_openvdb<BoxSampler>(state, false); });
-  add(smooth + "nullmark, blocks of 256", [](State& state) { look_up_in_blocks(state, *volume<TrilinearFilter>()); });
-  add(voxels + "0 NanoVDB ReadAccessor", [](State& state) { with_nanovdb<0>(state, false); });
-  add(voxels + "OpenVDB GridSampler", [](State& state) { with_openvdb<PointSampler>(state, false); });
-  add(voxels + "nullmark, blocks of 256", [](State& state) { look_up_in_blocks(state, *volume<NearestFilter>()); });
+  benchmark::RegisterBenchmark((group + "dense array, hand-written").c_str(), [](benchmark::State& state) {
+    const Fixture& fixture = Fixture::instance();
+    walk(state, [&](const Vec3& p) { return fixture.dense_trilinear(p.x(), p.y(), p.z()); });
+  });
+  benchmark::RegisterBenchmark((group + "OpenVDB GridSampler, hand-written").c_str(), [](benchmark::State& state) {
+    const auto accessor = Fixture::instance().grid->getConstAccessor();
+    using Sampler = openvdb::tools::BoxSampler;
+    walk(state, [&](const Vec3& p) { return static_cast<Real>(Sampler::sample(accessor, openvdb::Vec3d(p.x(), p.y(), p.z()))); });
+  });
+  benchmark::RegisterBenchmark((group + "nullmark, ratio").c_str(), [](benchmark::State& state) {
+    const auto medium = std::make_shared<FilteredVolume<TrilinearFilter>>(Fixture::instance().data, kExtinction);
+    run_kernel_bench(state, KernelBench({"ratio", {}, {}, {}}, medium, {"prescribed", {{"value", kExtinction}}, {}, {}},
+                                        Fixture::world_ray()));
+  });
 });
 
 }  // namespace
