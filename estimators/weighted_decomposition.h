@@ -47,6 +47,8 @@ struct WeightedDecompositionTracking {
 
   struct Ray : Passage<Value> {
     Rates control, rate;
+    Control<Value> constant;  ///< the control and its deviation as they are prepared; kept, or every ray would allocate them
+    Rates deviation;
   };
 
   /// The majorant is the rate; where it does not exceed the control, mu_c + max |mu - mu_c| is.
@@ -54,16 +56,14 @@ struct WeightedDecompositionTracking {
     ControlChoice choice;
     choice.kind = control;
     choice.value = std::accumulate(controls.begin(), controls.end(), Real{0});
-    Control<Value> constant;
-    Rates deviation;
-    prepare_control<Value>(choice, ray, constant, deviation);
+    prepare_control<Value>(choice, ray, ray.constant, ray.deviation);
     ray.control.start(ray.begin, ray.bounds.crossing);
     ray.rate.start(ray.begin, ray.bounds.crossing);
-    for (std::size_t i = 0; i < constant.of_segment.size(); ++i) {
+    for (std::size_t i = 0; i < ray.constant.of_segment.size(); ++i) {
       const Segment& segment = ray.bounds.segments[i];
-      const Real mu_c = channel(constant.of_segment[i], 0);
+      const Real mu_c = channel(ray.constant.of_segment[i], 0);
       ray.control.append(segment.end, mu_c);
-      ray.rate.append(segment.end, segment.majorant > mu_c ? segment.majorant : mu_c + deviation.rate(i));
+      ray.rate.append(segment.end, segment.majorant > mu_c ? segment.majorant : mu_c + ray.deviation.rate(i));
     }
   }
 

@@ -1,39 +1,63 @@
 #pragma once
 
-#include <benchmark/benchmark.h>
-
 #include <memory>
+#include <string>
+#include <utility>
 
-#include "harness/block_kernel.h"
-#include "media/majorants/prescribed.h"
+#include "harness/bench.h"
+#include "harness/parameter_values.h"
+#include "harness/scene.h"
 
 namespace nullmark {
 
-/// Times an estimator's kernel over a medium and a constant majorant on one ray along x through the middle of the unit cube: 256
-/// samples a traversal, a new address for each.  Counts lookups as items.
-template <template <class> class Estimator>
-void run_kernel_bench(benchmark::State& state, const std::shared_ptr<const Medium>& medium, Real majorant,
-                      const Ray& world = {{0, 0.5, 0.5}, {1, 0, 0}, 0, 1}) {
-  const BlockKernel<Estimator, Real> kernel({}, 1);
-  const PrescribedMajorant structure(*medium, majorant, Vec3::Zero());
-  const Extrema extrema = medium->extrema(medium->bounds());
-  const auto workspace = kernel.workspace();
-  RayContext context;
-  context.local = clipped(transformed(world, medium->world_to_local()), medium->bounds());
-  context.world = world;
-  context.world.begin = context.local.begin;
-  context.world.end = context.local.end;
-  SampleBlock block;
-  Counters counters;
-  std::uint64_t first = 0;
-  for ([[maybe_unused]] auto _ : state) {
-    structure.segments(context.world, context.local, context.segments);
-    kernel.begin_ray(*workspace, *medium, extrema, context);
-    kernel.sample(*workspace, *medium, context, 1, first, 256, Quantity::transmittance, block, counters);
-    benchmark::DoNotOptimize(block.values.data());
-    first += 256;
+/// A registered estimator's kernel over one ray, prepared as the harness prepares it.
+class KernelBench {
+ public:
+  /// Throws ParameterError where estimator, medium and majorant do not fit each other.
+  KernelBench(const Component& estimator, std::shared_ptr<const Medium> medium, const Component& majorant,
+              const Ray& world = {{0, 0.5, 0.5}, {1, 0, 0}, 0, 1})
+      : medium_(std::move(medium)), extrema_(medium_->extrema(medium_->bounds())) {
+    const auto source = make_estimator(estimator);
+    source->check(extrema_);
+    kernel_ = source->kernel(medium_->channels());
+    workspace_ = kernel_->workspace();
+    const Ray local = clipped(transformed(world, medium_->world_to_local()), medium_->bounds());
+    if (kernel_->needs_knots() && !medium_->polynomial_degree())
+      throw ParameterError("", "no exact traversal: the medium is not polynomial between knots");
+    if (kernel_->needs_optical_depth() && !medium_->optical_depth(local))
+      throw ParameterError("", "the medium has no closed-form optical depth");
+    scene_.rays = std::make_shared<BuiltRays>(BuiltRays{{Ray{world.origin, world.direction, local.begin, local.end}}, {local}});
+    scene_.medium = std::make_shared<BuiltMedium>(BuiltMedium{medium_, extrema_, {}, {}});
+    scene_.majorant = std::make_shared<BuiltMajorant>(BuiltMajorant{make_majorant(majorant)->build(medium_)});
   }
-  state.counters["items"] = static_cast<double>(counters.lookups);
+
+  /// 256 samples of new addresses, which share the ray's preparation and one traversal of the majorant.
+  void draw() {
+    scene_.context(0, *kernel_, context_);
+    kernel_->begin_ray(*workspace_, *medium_, extrema_, context_);
+    kernel_->sample(*workspace_, *medium_, context_, 1, counters_.samples, 256, Quantity::transmittance, block_, counters_);
+    benchmark::DoNotOptimize(block_.values.data());
+    benchmark::ClobberMemory();
+  }
+
+  const Counters& counters() const { return counters_; }
+
+ private:
+  std::shared_ptr<const Medium> medium_;
+  Extrema extrema_;
+  Scene scene_;
+  std::unique_ptr<const Kernel> kernel_;
+  std::unique_ptr<Workspace> workspace_;
+  RayContext context_;
+  SampleBlock block_;
+  Counters counters_;
+};
+
+/// Times a kernel; items are samples.
+inline void run_kernel_bench(benchmark::State& state, KernelBench bench) {
+  for ([[maybe_unused]] auto _ : state) bench.draw();
+  count_items(state, "sample", bench.counters().samples);
+  count_lookups(state, bench.counters().lookups);
 }
 
 }  // namespace nullmark

@@ -2,10 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <map>
 #include <string>
 #include <vector>
+
+#include "harness/bench.h"
 
 namespace {
 
@@ -16,8 +19,9 @@ double median(std::vector<double> values) {
 }
 
 /// Benchmarks are named group/what; the group's first entry is its hand-written baseline.  Prints the median nanoseconds of one
-/// counted item (lookup, draw) and the ratio to the baseline: ratios of one process carry over to other machines, nanoseconds do
-/// not.
+/// counted item over the repetitions (of the thread, for other processes share the machine), their median absolute deviation and
+/// the ratio to the baseline: ratios of one process carry over to other machines, nanoseconds do not.  Where items take lookups,
+/// how many, and the nanoseconds of one.
 class RatioReporter final : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context& context) override {
@@ -28,36 +32,47 @@ class RatioReporter final : public benchmark::BenchmarkReporter {
   void ReportRuns(const std::vector<Run>& runs) override {
     for (const Run& run : runs) {
       if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
-      const std::string name = run.run_name.function_name;
-      if (!values_.contains(name)) order_.push_back(name);
-      const auto items = run.counters.find("items");
-      values_[name].push_back(run.real_accumulated_time * 1e9 / (items == run.counters.end() ? 1 : items->second.value));
+      Figures& figures = figures_[run.run_name.function_name];
+      const double items = counter(run, "items", 1);
+      figures.item = run.report_label;
+      figures.ns.push_back(run.cpu_accumulated_time * 1e9 / items);
+      figures.lookups.push_back(counter(run, "lookups", 0) / items);
     }
   }
 
   void Finalize() override {
     // Interleaving reports cells in random order; by name they stand in groups with the baseline ("0 ...") first.
-    std::sort(order_.begin(), order_.end());
     std::string group;
     double base = 0;
-    for (const std::string& name : order_) {
+    for (const auto& [name, figures] : figures_) {
       const std::size_t slash = name.find('/');
-      const double ns = median(values_[name]);
+      const double ns = median(figures.ns), lookups = median(figures.lookups);
       if (name.substr(0, slash) != group) {
         group = name.substr(0, slash);
         base = ns;
         fmt::print("\n{}\n", group);
       }
       std::vector<double> deviation;
-      for (const double value : values_[name]) deviation.push_back(std::abs(value - ns));
-      fmt::print("  {:<44} {:8.2f} ns  +-{:4.1f} %  {:6.2f}x\n", name.substr(slash + 1), ns, 100 * median(deviation) / ns,
-                 ns / base);
+      for (const double value : figures.ns) deviation.push_back(std::abs(value - ns));
+      fmt::print("  {:<48} {:9.2f} ns/{:<8} +-{:4.1f} %  {:6.2f}x", name.substr(slash + 1), ns, figures.item,
+                 100 * median(deviation) / ns, ns / base);
+      if (lookups > 0) fmt::print("  {:7.2f} lookups of {:6.2f} ns", lookups, ns / lookups);
+      fmt::print("\n");
     }
   }
 
  private:
-  std::vector<std::string> order_;
-  std::map<std::string, std::vector<double>> values_;
+  struct Figures {
+    std::string item;
+    std::vector<double> ns, lookups;
+  };
+
+  static double counter(const Run& run, const char* name, double otherwise) {
+    const auto found = run.counters.find(name);
+    return found == run.counters.end() ? otherwise : found->second.value;
+  }
+
+  std::map<std::string, Figures> figures_;
 };
 
 }  // namespace
@@ -70,6 +85,7 @@ int main(int argc, char** argv) {
   int count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());
   if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 2;
+  nullmark::BenchmarkGroup::add_all();
   RatioReporter reporter;
   return benchmark::RunSpecifiedBenchmarks(&reporter) > 0 ? 0 : 5;
 }

@@ -1,7 +1,7 @@
-#include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
 #include "estimators/delta.h"
+#include "harness/bench.h"
 #include "harness/estimator_template.h"
 #include "harness/path_kernel.h"
 #include "media/gaussian_bump.h"
@@ -83,11 +83,12 @@ void add(const std::string& group, const char* kernel, const Effects& effects, b
                                [=](benchmark::State& state) {
                                  Paths paths(scene, general);
                                  for ([[maybe_unused]] auto _ : state) paths.draw(256);
-                                 state.counters["items"] = static_cast<double>(paths.counters().samples);
+                                 count_items(state, "path", paths.counters().samples);
+                                 count_lookups(state, paths.counters().lookups);
                                });
 }
 
-[[maybe_unused]] const bool kRegistered = [] {
+[[maybe_unused]] const BenchmarkGroup kGroup([] {
   const Effects all{.chromatic = false};
   const auto without = [&](auto... left_out) {
     Effects effects = all;
@@ -113,8 +114,7 @@ void add(const std::string& group, const char* kernel, const Effects& effects, b
     add(name, "0 general", effects, true);
     add(name, "composed", effects, false);
   }
-  return true;
-}();
+});
 
 }  // namespace
 }  // namespace nullmark

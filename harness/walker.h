@@ -118,7 +118,7 @@ class EstimatorWalker final : public Walker<Value> {
   struct State final : WalkMemory {
     Along ray;
     Walk walk;
-    Vec3 origin, direction;  ///< local
+    nullmark::Ray local;
     std::array<Real, std::is_same_v<Value, Real> ? 1 : kMaxChannels> extinction;
   };
 
@@ -159,14 +159,16 @@ class EstimatorWalker final : public Walker<Value> {
     ray.knots.clear();
     if (needs_knots()) sorted_knots(*course.medium, local, ray.knots);
     if constexpr (requires { E::kNeedsInversion; })
-      ray.distance_at_depth = [medium = course.medium, local](Real depth) { return distance_at_depth(*medium, local, depth); };
+      // Two pointers fit std::function's own memory; a ray would be allocated for every leg of a path.
+      ray.distance_at_depth = [medium = course.medium, along = &state.local](Real depth) {
+        return distance_at_depth(*medium, *along, depth);
+      };
     if constexpr (requires { E::kNeedsShares; }) detail::prepare_shares(ray, *course.medium, local);
     ray.degree = course.medium->polynomial_degree();
     ray.entry = world.at(world.begin);
     ray.albedo = course.albedo;
     ray.draws_absorption = course.draws_absorption;
-    state.origin = local.origin;
-    state.direction = local.direction;
+    state.local = local;
     if constexpr (requires { estimator_.prepare(ray); }) estimator_.prepare(ray);
   }
 
@@ -194,7 +196,7 @@ class EstimatorWalker final : public Walker<Value> {
     estimator_.init(state.walk, state.ray, flight, rng);
     std::uint64_t lookups = 0;
     while (!patience.exhausted() && estimator_.propose(state.walk, state.ray, flight, rng)) {
-      const Vec3 p = state.origin + flight.position() * state.direction;
+      const Vec3 p = state.local.at(flight.position());
       if constexpr (requires { E::kNeedsShares; }) {
         const int component = estimator_.component(state.walk);
         state.extinction[0] = course.medium->component_extinction(component, p) / state.ray.shares[flight.piece()][component];

@@ -25,11 +25,11 @@ inline std::pair<Real, Real> outward(std::pair<Real, Real> bounds) {
 ///
 /// `Profile` has `Real value(Real s)` = f(s) >= 0, `Real integral(Real a, Real b)` = int_a^b f ds for a < b in closed form and
 /// relatively accurate however close a and b are, `std::pair<Real, Real> extrema(Real a, Real b)`, and where they exist `value`
-/// as a template over Real and Lanes, `void
-/// knots(std::vector<Real>& s)`, `int polynomial_degree()`, `prepare()`, `Real fraction_at(Real a, Real b, Real mean)`: the x of
-/// int_0^x f(a + (b - a) y) dy = mean, for b on either side of a, where it is below 1. With `optical_depth` tau > 0, scale = tau
-/// / (int_0^1 f ds * (hi - lo)): the axis then has the transmittance e^-tau whatever the profile's own amplitude; otherwise scale
-/// = 1.
+/// as a template over Real and Lanes, `void knots(std::vector<Real>& s)` or the knots sorted, `std::vector<Real> cuts`, which
+/// spares samplers that ask for them along every leg of a path an allocation; `int polynomial_degree()`, `prepare()`, `Real
+/// fraction_at(Real a, Real b, Real mean)`: the x of int_0^x f(a + (b - a) y) dy = mean, for b on either side of a, where it is
+/// below 1. With `optical_depth` tau > 0, scale = tau / (int_0^1 f ds * (hi - lo)): the axis then has the transmittance e^-tau
+/// whatever the profile's own amplitude; otherwise scale = 1.
 template <class Profile>
 struct AlongAxis {
   static constexpr const char* kName = Profile::kName;
@@ -94,10 +94,15 @@ struct AlongAxis {
   }
 
   void knots(const Ray& ray, std::vector<Real>& t) const {
-    if constexpr (requires(std::vector<Real> s) { profile.knots(s); }) {
+    const auto append = [&](const std::vector<Real>& s) {
+      for (const Real knot : s) append_crossing(ray, axis, lo[axis] + knot * (hi[axis] - lo[axis]), t);
+    };
+    if constexpr (requires { profile.cuts; }) {
+      append(profile.cuts);
+    } else if constexpr (requires(std::vector<Real> s) { profile.knots(s); }) {
       std::vector<Real> s;
       profile.knots(s);
-      for (const Real knot : s) append_crossing(ray, axis, lo[axis] + knot * (hi[axis] - lo[axis]), t);
+      append(s);
     }
   }
 
@@ -128,11 +133,25 @@ struct AlongAxis {
  private:
   // A mean does depend on b - a where f jumps between them; lengths from knot to knot do not.
   Real sum_of_constant_pieces(const Ray& ray) const {
-    std::vector<Real> t = {ray.begin, ray.end};
-    knots(ray, t);
-    std::sort(t.begin(), t.end());
-    Real sum = 0;
-    for (std::size_t i = 1; i < t.size(); ++i) sum += extinction(ray.at((t[i - 1] + t[i]) / 2)) * (t[i] - t[i - 1]);
+    Real sum = 0, from = ray.begin;
+    const auto add_to = [&](Real t) {
+      sum += extinction(ray.at((from + t) / 2)) * (t - from);
+      from = t;
+    };
+    if constexpr (requires { profile.cuts; }) {
+      const Real d = ray.direction[axis];
+      for (std::size_t i = 0; d != 0 && i < profile.cuts.size(); ++i) {
+        const Real cut = d > 0 ? profile.cuts[i] : profile.cuts[profile.cuts.size() - 1 - i];
+        const Real t = (lo[axis] + cut * (hi[axis] - lo[axis]) - ray.origin[axis]) / d;
+        if (t > ray.begin && t < ray.end) add_to(t);
+      }
+    } else {
+      std::vector<Real> t;
+      knots(ray, t);
+      std::sort(t.begin(), t.end());
+      for (const Real knot : t) add_to(knot);
+    }
+    add_to(ray.end);
     return sum;
   }
 };

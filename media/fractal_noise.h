@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <boost/container/small_vector.hpp>
 
 #include "media/field.h"
 #include "media/philox.h"
@@ -145,10 +146,11 @@ struct FractalNoise {
     return peak * power;
   }
 
-  /// Ends of [a, b] and the lattice planes between them.
-  static std::vector<Place> places(Real a, Real b, int cells) {
+  /// Ends of [a, b] and the lattice planes between them.  Sums of media ask for bounds along every leg of a path, so the usual
+  /// number is not allocated.
+  static boost::container::small_vector<Place, 64> places(Real a, Real b, int cells) {
     const Place first = place(a, cells), last = place(b, cells);
-    std::vector<Place> all = {first};
+    boost::container::small_vector<Place, 64> all = {first};
     for (int plane = first.cell + 1; plane <= last.cell; ++plane) all.push_back({plane, 0});
     all.push_back(last);
     return all;

@@ -17,7 +17,7 @@ struct LayersProfile {
   std::vector<Real> values = {0.5, 2, 0, 1};
   std::vector<Real> edges;
 
-  std::vector<Real> cuts;  ///< edges with the defaults filled in
+  std::vector<Real> cuts;  ///< where f jumps: edges with the defaults filled in
 
   void parameters(ParameterVisitor& visit) {
     visit.numbers("values", values, 1, 4096, Range::non_negative(), "1/length", "extinction of each layer, from below");
@@ -58,7 +58,6 @@ struct LayersProfile {
     return {*range.first, *range.second};
   }
 
-  void knots(std::vector<Real>& s) const { s.insert(s.end(), cuts.begin(), cuts.end()); }
   int polynomial_degree() const { return 0; }
 
  private:

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <boost/container/static_vector.hpp>
 #include <cstdio>
 
 #include "media/along_axis.h"
@@ -27,7 +28,7 @@ struct PolynomialProfile {
       throw ParameterError("coefficients", "expected 1 to 4 coefficients, found " + std::to_string(coefficients.size()));
     c = {};
     std::copy(coefficients.begin(), coefficients.end(), c.begin());
-    const std::vector<Real> candidates = candidate_points(0, 1);
+    const auto candidates = candidate_points(0, 1);
     const Real lowest =
         *std::min_element(candidates.begin(), candidates.end(), [this](Real a, Real b) { return horner(a) < horner(b); });
     // A double root, (s - 1/3)^2, dips below zero by rounding alone; `value` cuts that off.
@@ -77,8 +78,8 @@ struct PolynomialProfile {
   }
 
   /// a, b and the zeros of f' between them: the extrema of f over [a, b] are among its values there.
-  std::vector<Real> candidate_points(Real a, Real b) const {
-    std::vector<Real> points = {a, b};
+  boost::container::static_vector<Real, 4> candidate_points(Real a, Real b) const {
+    boost::container::static_vector<Real, 4> points = {a, b};
     const auto add = [&](Real s) {
       if (s > a && s < b) points.push_back(s);
     };

@@ -1,0 +1,78 @@
+#include <fmt/format.h>
+
+#include "harness/bench_kernel.h"
+#include "harness/calibration.h"
+
+namespace nullmark {
+namespace {
+
+// Every registered estimator along rays of length 1 whose majorant is the number of lookups that a ratio tracker takes.  Inputs
+// of hand-written loops are volatile: Google Benchmark 1.7's DoNotOptimize of a double that is written corrupts it under GCC.
+
+template <class Extinction>
+void plain_loop(benchmark::State& state, Real majorant, const Extinction& extinction) {
+  PlainRng rng(1);
+  std::uint64_t lookups = 0, samples = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    for (int i = 0; i < 256; ++i) benchmark::DoNotOptimize(plain_ratio_loop(rng, majorant, extinction, lookups));
+    samples += 256;
+  }
+  count_items(state, "sample", samples);
+  count_lookups(state, lookups);
+}
+
+void plain_constant(benchmark::State& state, Real majorant) {
+  volatile Real half = majorant / 2;
+  const Real mu = half;
+  plain_loop(state, majorant, [&](Real) { return mu; });
+}
+
+void plain_gaussian(benchmark::State& state, Real majorant) {
+  volatile Real height = majorant, middle = 0.32, sigma = 0.05;
+  const Real amplitude = height, centre = middle, scale = 1 / sigma;
+  plain_loop(state, majorant, [&](Real t) {
+    const Real s = (t - centre) * scale;
+    return amplitude * std::exp(-0.5 * s * s);
+  });
+}
+
+void floor(benchmark::State& state) {
+  constexpr std::uint64_t kSteps = 4096;
+  PlainRng rng(1);
+  volatile Real rate = 0.1;
+  std::uint64_t steps = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    benchmark::DoNotOptimize(floor_loop(rng, rate, kSteps));
+    steps += kSteps;
+  }
+  count_items(state, "step", steps);
+}
+
+void add(const std::string& profile, void (*baseline)(benchmark::State&, Real), Real lookups,
+         const std::shared_ptr<const Medium>& medium) {
+  const std::string group = fmt::format("estimators, {}, {} lookups of ratio tracking/", profile, lookups);
+  const Component majorant{"prescribed", {{"value", lookups}}, {}, {}};
+  benchmark::RegisterBenchmark((group + "0 ratio tracking, hand-written").c_str(),
+                               [=](benchmark::State& state) { baseline(state, lookups); });
+  for (const ComponentInfo& entry : registered(ComponentKind::estimator)) {
+    const auto bench = [=] { return KernelBench({entry.name, {}, {}, {}}, medium, majorant); };
+    try {
+      bench().draw();
+    } catch (const ParameterError&) {
+      continue;
+    }
+    benchmark::RegisterBenchmark((group + entry.name).c_str(),
+                                 [=](benchmark::State& state) { run_kernel_bench(state, bench()); });
+  }
+}
+
+[[maybe_unused]] const BenchmarkGroup kGroup([] {
+  benchmark::RegisterBenchmark("least step/0 random number, std::log, advance", floor);
+  for (const Real lookups : {5., 30.}) {
+    add("constant", plain_constant, lookups, make_medium({"homogeneous", {{"extinction", lookups / 2}}, {}, {}})->build());
+    add("Gaussian", plain_gaussian, lookups, make_medium({"gaussian_bump", {{"amplitude", lookups}}, {}, {}})->build());
+  }
+});
+
+}  // namespace
+}  // namespace nullmark
