@@ -5,7 +5,10 @@
 
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <map>
+
+#include "harness/lanes.h"
 
 namespace nullmark {
 namespace {
@@ -42,7 +45,7 @@ struct ChunkResult {
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
   std::map<std::size_t, Evidence> evidence;  ///< by test; a chunk touches few of them
-  Clock::duration judging{}, working{};
+  Clock::duration judging{}, statistics{}, working{};
 };
 
 /// Errors on their way to the tests of a gate: summed in short runs, gathered over rays, and bet on by the thousand.
@@ -76,7 +79,8 @@ class Evidences {
   void add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups) {
     if (!gate_ || !lookups_) return;
     errors_.resize(lookups.size());
-    for (std::size_t i = 0; i < lookups.size(); ++i) errors_[i] = static_cast<Real>(lookups[i]) - gate_->lookups[ray];
+    const Real expected = gate_->lookups[ray];
+    for (std::size_t i = 0; i < lookups.size(); ++i) errors_[i] = static_cast<Real>(lookups[i]) - expected;
     sum(errors_, gate_->lookups_per_sum);
     feed(*lookups_, errors_);
   }
@@ -151,11 +155,45 @@ struct Scratch {
   std::unique_ptr<Workspace> workspace;
   RayContext context;
   SampleBlock block;
-  std::vector<Real> errors;
+  std::vector<Real> errors, finite;
 };
 
 /// Rounding allowed to samples at the ends of their declared range.
 constexpr Real kRangeSlack = 1e-9;
+
+/// errors = values - reference; whether all values lie in [low, high], which none does that is not finite.
+bool subtract(const Real* values, Real reference, Real low, Real high, std::span<Real> errors) {
+  Lanes value{};
+  auto inside = value == value;
+  std::size_t i = 0;
+  for (; i + kLanes <= errors.size(); i += kLanes) {
+    load(values + i, value);
+    inside &= (value >= low) & (value <= high);
+    store(value - reference, &errors[i]);
+  }
+  bool all = true;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) all &= inside[lane] != 0;
+  for (; i < errors.size(); ++i) {
+    all &= values[i] >= low && values[i] <= high;
+    errors[i] = values[i] - reference;
+  }
+  return all;
+}
+
+Real sum_of_squares(std::span<const std::uint32_t> counts) {
+  using Counts [[gnu::vector_size(kLanes * sizeof(std::uint32_t))]] = std::uint32_t;
+  Lanes sum{};
+  Counts each;
+  std::size_t i = 0;
+  for (; i + kLanes <= counts.size(); i += kLanes) {
+    std::memcpy(&each, &counts[i], sizeof each);
+    const Lanes count = __builtin_convertvector(each, Lanes);
+    sum += count * count;
+  }
+  Real result = total(sum);
+  for (; i < counts.size(); ++i) result += static_cast<Real>(counts[i]) * counts[i];
+  return result;
+}
 
 }  // namespace
 
@@ -197,6 +235,38 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     };
     return fresh;
   });
+  // Fills `errors` of an output, 0 for samples that are not finite, and tells those that count.
+  constexpr Real kLargest = std::numeric_limits<Real>::max();
+  const Real low = gate ? std::max(gate->low - kRangeSlack, -kLargest) : -kLargest;
+  const Real high = gate ? std::min(gate->high + kRangeSlack, kLargest) : kLargest;
+  const bool as_drawn = cell.measurement == Measurement{};
+  const auto take_errors = [&](Scratch& mine, std::size_t o, Real target, std::span<Real> errors,
+                               ChunkResult& out) -> std::span<const Real> {
+    const std::vector<Real>& values = mine.block.values;
+    const Real reference = span.about_zero ? 0 : measured(target, cell.measurement);
+    if (as_drawn) {
+      const Real* drawn = values.data();
+      if (outputs > 1) {
+        mine.finite.resize(errors.size());
+        for (std::size_t i = 0; i < errors.size(); ++i) mine.finite[i] = values[i * outputs + o];
+        drawn = mine.finite.data();
+      }
+      if (subtract(drawn, reference, low, high, errors)) return errors;
+    }
+    mine.finite.clear();
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      const Real value = values[i * outputs + o];
+      errors[i] = 0;
+      if (!std::isfinite(value)) {
+        ++out.nonfinite;
+        continue;
+      }
+      out.out_of_range += !(value >= low && value <= high);
+      errors[i] = measured(value, cell.measurement) - reference;
+      mine.finite.push_back(errors[i]);
+    }
+    return mine.finite;
+  };
   std::atomic<std::size_t> done = 0;
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t at) {
     if (stopped || stop()) {
@@ -223,31 +293,27 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         const std::uint64_t batch = std::min(kBatch, chunk.count - drawn);
         kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, span.first + chunk.first + drawn, batch,
                       cell.quantity, mine.block, out.counters);
+        const auto drawn_at = Clock::now();
         mine.errors.resize(batch * outputs);
         for (std::size_t o = 0; o < outputs; ++o) {
-          Moments& moments = out.moments[local * outputs + o];
-          const Real reference = measured(targets.mean[ray * outputs + o], cell.measurement);
-          const Real shift = gate ? gate->shift[ray * outputs + o] : 0;
-          for (std::size_t i = 0; i < batch; ++i) {
-            const Real value = mine.block.values[i * outputs + o];
-            mine.errors[o * batch + i] = 0;
-            if (!std::isfinite(value)) {
-              ++out.nonfinite;
-              continue;
-            }
-            if (gate && !(value >= gate->low - kRangeSlack && value <= gate->high + kRangeSlack)) ++out.out_of_range;
-            const Real error = measured(value, cell.measurement) - reference;
-            const Real counted = span.about_zero ? value : error;
-            moments.add(counted);
-            out.groups[o].add(counted);
-            mine.errors[o * batch + i] = error - shift;
-          }
+          const Real target = targets.mean[ray * outputs + o];
+          const std::span<Real> errors(&mine.errors[o * batch], batch);
+          const std::span<const Real> counted = take_errors(mine, o, target, errors, out);
+          out.moments[local * outputs + o].add(counted);
+          out.groups[o].add(counted);
         }
-        const auto judging = Clock::now();
-        for (std::size_t o = 0; o < outputs && gate; ++o) evidences.add_errors(ray, o, {&mine.errors[o * batch], batch});
+        out.lookups_squared[local] += sum_of_squares(mine.block.lookups);
+        const auto counted_at = Clock::now();
+        for (std::size_t o = 0; o < outputs && gate; ++o) {
+          const std::span<Real> errors(&mine.errors[o * batch], batch);
+          if (const Real shift = gate->shift[ray * outputs + o]; shift != 0)
+            for (Real& error : errors) error -= shift;
+          evidences.add_errors(ray, o, errors);
+        }
         evidences.add_lookups(ray, mine.block.lookups);
-        out.judging += Clock::now() - judging;
-        for (const std::uint32_t n : mine.block.lookups) out.lookups_squared[local] += static_cast<Real>(n) * n;
+        const auto judged_at = Clock::now();
+        out.statistics += judged_at - drawn_at;
+        out.judging += judged_at - counted_at;
       }
       out.lookups[local] = out.counters.lookups - lookups_before;
       for (std::size_t o = 0; o < outputs; ++o) {
@@ -255,10 +321,12 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         out.groups[o].finish_ray();
       }
     }
-    const auto judging = Clock::now();
+    const auto drawn_at = Clock::now();
     evidences.finish();
-    out.judging += Clock::now() - judging;
-    out.working += Clock::now() - begun;
+    const auto judged_at = Clock::now();
+    out.statistics += judged_at - drawn_at;
+    out.judging += judged_at - drawn_at;
+    out.working += judged_at - begun;
     progress(static_cast<double>(++done) / static_cast<double>(chunks.size()));
   });
   if (stopped) return std::nullopt;
@@ -282,6 +350,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     result.counters += part.counters;
     result.nonfinite += part.nonfinite;
     result.out_of_range += part.out_of_range;
+    result.statistics_seconds += std::chrono::duration<double>(part.statistics).count();
     result.judging_seconds += std::chrono::duration<double>(part.judging).count();
     result.working_seconds += std::chrono::duration<double>(part.working).count();
     for (const auto& [test, evidence] : part.evidence) result.evidence[test] += evidence;
