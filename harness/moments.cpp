@@ -1,5 +1,7 @@
 #include "harness/moments.h"
 
+#include <array>
+
 #include "harness/lanes.h"
 
 namespace nullmark {
@@ -61,20 +63,28 @@ void Moments::add(std::span<const Real> errors) {
   *this += sum;
 }
 
+/// Errors that are added together at once: their sums stay near.
+constexpr std::size_t kFew = 1024;
+
 void GroupErrors::add(std::span<const Real> errors) {
-  if (errors.empty()) return;
-  sums_.resize(errors.size());
+  for (std::size_t first = 0; first < errors.size(); first += kFew)
+    add_few(errors.subspan(first, std::min(kFew, errors.size() - first)));
+}
+
+void GroupErrors::add_few(std::span<const Real> errors) {
+  std::array<Real, kFew / 2> even;  // sums of the first, third, ... level
+  std::array<Real, kFew / 4> odd;
   const Real* from = errors.data();
-  Real *to = sums_.data(), *spare = to + errors.size() / 2;
   std::size_t groups = errors.size(), level = 0;
-  for (Real squares = sum_of_squares(errors); groups > 1; ++level) {
+  Real scale = 1;  // of squares: 4^-level
+  for (Real squares = sum_of_squares(errors); groups > 1; ++level, scale /= 4) {
     reach(level);
-    levels_[level].sum_of_squares += std::ldexp(squares, -2 * static_cast<int>(level));
+    levels_[level].sum_of_squares += scale * squares;
     levels_[level].groups += groups;
     groups /= 2;
+    Real* const to = level % 2 == 0 ? even.data() : odd.data();
     squares = add_pairs(from, groups, to);
     from = to;
-    std::swap(to, spare);
   }
   carry(level, *from);
 }

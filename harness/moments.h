@@ -91,6 +91,7 @@ class GroupErrors {
   const std::vector<Level>& levels() const { return levels_; }
 
  private:
+  void add_few(std::span<const Real> errors);
   void reach(std::size_t level) {
     if (level < levels_.size()) return;
     levels_.resize(level + 1);
@@ -101,7 +102,6 @@ class GroupErrors {
   std::vector<Level> levels_;
   std::vector<Real> pending_;
   std::vector<bool> has_pending_;
-  std::vector<Real> sums_;
 };
 
 }  // namespace nullmark

@@ -51,8 +51,14 @@ struct ChunkResult {
 /// Errors on their way to the tests of a gate: summed in short runs, gathered over rays, and bet on by the thousand.
 class Evidences {
  public:
-  Evidences(const CellGate* gate, std::size_t channels, std::map<std::size_t, Evidence>& out)
-      : gate_(gate), out_(out), pooled_(channels), grouped_(channels) {
+  /// Kept from chunk to chunk: fresh pages cost more than what is written to them.
+  struct Memory {
+    std::vector<std::vector<Real>> pending;  ///< by test
+    std::vector<Real> sums;
+  };
+
+  Evidences(const CellGate* gate, std::size_t channels, Memory& memory, std::map<std::size_t, Evidence>& out)
+      : gate_(gate), out_(out), pooled_(channels), grouped_(channels), pending_(memory.pending), sums_(memory.sums) {
     if (!gate_) return;
     pending_.resize(gate_->tests.size());
     for (std::size_t i = 0; i < gate_->tests.size(); ++i) {
@@ -72,17 +78,24 @@ class Evidences {
   void add_errors(std::size_t ray, std::size_t channel, std::span<const Real> errors) {
     if (!gate_ || !pooled_[channel]) return;
     sum(errors, gate_->errors_per_sum);
-    feed(*pooled_[channel], errors);
-    if (!grouped_[channel].empty()) feed(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])], errors);
+    const auto largest = [&] {
+      Real most = 0;
+      for (const Real error : errors) most = std::max(most, std::abs(error));
+      return most;
+    };
+    feed(*pooled_[channel], largest);
+    if (!grouped_[channel].empty()) feed(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])], largest);
   }
 
   void add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups) {
-    if (!gate_ || !lookups_) return;
-    errors_.resize(lookups.size());
+    if (!gate_ || !lookups_ || lookups.empty()) return;
+    sum(lookups, gate_->lookups_per_sum);
     const Real expected = gate_->lookups[ray];
-    for (std::size_t i = 0; i < lookups.size(); ++i) errors_[i] = static_cast<Real>(lookups[i]) - expected;
-    sum(errors_, gate_->lookups_per_sum);
-    feed(*lookups_, errors_);
+    for (Real& sum : sums_) sum -= expected * gate_->lookups_per_sum;
+    feed(*lookups_, [&] {
+      const auto [least, most] = std::minmax_element(lookups.begin(), lookups.end());
+      return std::max(expected - *least, *most - expected);
+    });
   }
 
   void finish() {
@@ -93,17 +106,19 @@ class Evidences {
   static constexpr std::size_t kTogether = 8192, kEnough = 2048;
 
   /// Which errors share a sum is free; a stride lets all sums advance together.
-  void sum(std::span<const Real> errors, int together) {
+  template <class Number>
+  void sum(std::span<const Number> errors, int together) {
     const std::size_t count = errors.size() / static_cast<std::size_t>(together);
     sums_.assign(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(count));
     for (std::size_t k = 1; k < static_cast<std::size_t>(together); ++k)
-      for (std::size_t j = 0; j < count; ++j) sums_[j] += errors[k * count + j];
+      for (std::size_t j = 0; j < count; ++j) sums_[j] += static_cast<Real>(errors[k * count + j]);
   }
 
-  void feed(std::size_t test, std::span<const Real> errors) {
+  template <class Largest>
+  void feed(std::size_t test, Largest largest_error) {
     Evidence& evidence = out_[test];
     if (gate_->tests[test].deterministic) {
-      for (const Real error : errors) evidence.largest_error = std::max(evidence.largest_error, std::abs(error));
+      evidence.largest_error = std::max(evidence.largest_error, largest_error());
       evidence.sums += sums_.size();
       return;
     }
@@ -131,8 +146,8 @@ class Evidences {
   std::vector<std::optional<std::size_t>> pooled_;                // test by channel
   std::vector<std::vector<std::optional<std::size_t>>> grouped_;  // by channel and group
   std::optional<std::size_t> lookups_;
-  std::vector<std::vector<Real>> pending_;  // by test
-  std::vector<Real> sums_, errors_;
+  std::vector<std::vector<Real>>& pending_;
+  std::vector<Real>& sums_;
 };
 
 std::vector<Chunk> cut(std::size_t rays, std::uint64_t samples, std::uint64_t chunk) {
@@ -156,6 +171,7 @@ struct Scratch {
   RayContext context;
   SampleBlock block;
   std::vector<Real> errors, finite;
+  Evidences::Memory evidence;
 };
 
 /// Rounding allowed to samples at the ends of their declared range.
@@ -282,7 +298,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     out.groups.resize(outputs);
     out.group_sums.assign(outputs, 0);
     const auto begun = Clock::now();
-    Evidences evidences(gate, outputs, out.evidence);
+    Evidences evidences(gate, outputs, mine.evidence, out.evidence);
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
       scene.context(ray, kernel, mine.context);
       kernel.begin_ray(*mine.workspace, *scene.medium->medium, scene.medium->extrema, mine.context);
