@@ -102,12 +102,13 @@ RayProfile::RayProfile(const Lookup& lookup, int channels, std::span<const Real>
 
 std::vector<Real> RayProfile::running(const std::vector<Real>& values) const {
   std::vector<Real> result(values.size());
+  const auto& matrix = rule().running;
   Real before = 0;
   for (std::size_t panel = 0; panel < widths_.size(); ++panel) {
     const std::size_t first = panel * kNodes;
     const Eigen::Map<const Eigen::Matrix<Real, kNodes, 1>> f(values.data() + first);
     Eigen::Map<Eigen::Matrix<Real, kNodes, 1>> out(result.data() + first);
-    out = widths_[panel] * (rule().running * f);
+    out = widths_[panel] * matrix.lazyProduct(f);
     out.array() += before;
     for (std::size_t i = 0; i < kNodes; ++i) before += widths_[panel] * rule().w[i] * values[first + i];
   }

@@ -257,6 +257,7 @@ ExitCode run_command(const RunCommand& command) {
       if (journal) journal->append(record);
     };
     observer.verdict_share = [&](double share) { context.verdict_share = share; };
+    observer.statistics_share = [&](double share) { context.statistics_share = share; };
     observer.warning = [&](const std::string& message) { progress.warning(message); };
     std::vector<CellRecord> records = run_plan(plan, selected, finished, options, observer);
     for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i)

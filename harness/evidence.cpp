@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
+#include "harness/lanes.h"
 #include "media/elementary.h"
 
 namespace nullmark {
@@ -11,32 +13,82 @@ namespace {
 
 /// Largest factor: more than that is not won at once.  Its kTogether-th power is finite.
 constexpr Real kMostWon = 0x1p30;
+constexpr std::size_t kTogether = 32;
 
-/// Sum of log factor(s), factor <= kMostWon, with one logarithm for every kTogether factors.
+/// Products in lanes, of any size: mantissas in [1, 2) and powers of two apart, so that logarithms are taken once at the end.
+class Products {
+ public:
+  /// Takes x > 0, finite; by x^-1 where `sign` is -1.
+  void multiply(Lanes x, int sign) {
+    take_exponent(x, sign);
+    mantissa_ = sign > 0 ? mantissa_ * x : mantissa_ / x;
+    take_exponent(mantissa_, 1);
+  }
+
+  /// Sum of the logarithms of all lanes.
+  Real log() const {
+    std::array<Real, kLanes> negative;
+    store(mantissa_, negative.data());
+    negative_logarithms(negative.data(), kLanes, negative.data());
+    Real sum = 0;
+    std::int64_t exponents = 0;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      sum -= negative[lane];
+      exponents += exponent_[lane];
+    }
+    return sum + static_cast<Real>(exponents) * std::numbers::ln2_v<Real>;
+  }
+
+ private:
+  using Integers [[gnu::vector_size(sizeof(Lanes))]] = std::int64_t;
+
+  void take_exponent(Lanes& x, int sign) {
+    constexpr int kFraction = 52;
+    constexpr std::int64_t kBias = 1023;
+    Integers bits;
+    std::memcpy(&bits, &x, sizeof bits);
+    exponent_ += sign * ((bits >> kFraction) - kBias);
+    bits = (bits & ((std::int64_t{1} << kFraction) - 1)) | (kBias << kFraction);
+    std::memcpy(&x, &bits, sizeof bits);
+  }
+
+  Lanes mantissa_ = Lanes{} + 1;
+  Integers exponent_{};
+};
+
+/// Sum of log won(s) - log lost(s); `factor` multiplies the two products by a sum's, won <= kMostWon.  A sum `neutral` has
+/// factor 1.
 template <class Factor>
-Real sum_of_logs(std::span<const Real> sums, Factor factor) {
-  constexpr std::size_t kLanes = 64, kTogether = 32;
+Real sum_of_logs(std::span<const Real> sums, Real neutral, Factor factor) {
   // A wealth that is lost for good; what this adds to its expectation is nothing.
   constexpr Real kLost = 1e-300;
-  std::array<Real, kLanes> product;
-  Real total = 0;
+  constexpr std::size_t kChains = 4;  // that do not wait for each other
+  const Lanes least = Lanes{} + kLost, most = Lanes{} + 1 / kLost;
+  Products products;
   for (std::size_t i = 0; i < sums.size();) {
-    product.fill(1);
-    for (std::size_t k = 0; k < kTogether && i < sums.size(); ++k) {
-      const std::size_t n = std::min(kLanes, sums.size() - i);
-      const Real* s = &sums[i];
-      if (n == kLanes) {
-        for (std::size_t j = 0; j < kLanes; ++j) product[j] *= factor(s[j]);
-      } else {
-        for (std::size_t j = 0; j < n; ++j) product[j] *= factor(s[j]);
+    std::array<Lanes, kChains> won, lost;
+    won.fill(Lanes{} + 1);
+    lost.fill(Lanes{} + 1);
+    Lanes x;
+    for (std::size_t k = 0; k < kTogether && i + kChains * kLanes <= sums.size(); ++k)
+      for (std::size_t chain = 0; chain < kChains; ++chain, i += kLanes) {
+        load(&sums[i], x);
+        factor(x, won[chain], lost[chain]);
       }
-      i += n;
+    if (sums.size() - i < kChains * kLanes)
+      for (std::size_t chain = 0; i < sums.size(); ++chain, i += kLanes) {
+        std::array<Real, kLanes> rest;
+        rest.fill(neutral);
+        std::copy_n(&sums[i], std::min(kLanes, sums.size() - i), rest.data());
+        load(rest.data(), x);
+        factor(x, won[chain], lost[chain]);
+      }
+    for (std::size_t chain = 0; chain < kChains; ++chain) {
+      products.multiply(won[chain] > least ? won[chain] : least, 1);
+      products.multiply(lost[chain] < most ? lost[chain] : most, -1);
     }
-    for (Real& x : product) x = std::max(x, kLost);
-    negative_logarithms(product.data(), kLanes, product.data());
-    for (const Real negative : product) total -= negative;
   }
-  return total;
+  return products.log();
 }
 
 }  // namespace
@@ -46,12 +98,17 @@ std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums, int errors_
   const Real shift = bet.limit * errors_per_sum;
   for (const Real rate : bet.rates) {
     const Real l = rate * bet.side;
+    const Real start = -l * shift;
     if (bet.kind == Bet::Kind::betting) {
-      logs.push_back(sum_of_logs(sums, [=](Real x) { return std::min(1 + l * (x - shift), kMostWon); }));
+      logs.push_back(sum_of_logs(sums, shift, [=](const Lanes& x, Lanes& won, Lanes&) {
+        const Lanes f = (1 + start) + l * x;
+        won *= f < kMostWon ? f : Lanes{} + kMostWon;
+      }));
     } else {
-      logs.push_back(sum_of_logs(sums, [=](Real x) {
-        const Real y = l * (x - shift), size = std::abs(y), f = 1 + size + size * size / 2;
-        return y >= 0 ? std::min(f, kMostWon) : 1 / f;
+      logs.push_back(sum_of_logs(sums, shift, [=](const Lanes& x, Lanes& won, Lanes& lost) {
+        const Lanes one = Lanes{} + 1, y = start + l * x, size = y < 0 ? -y : y, f = 1 + size * (1 + size / 2);
+        won *= y < 0 ? one : f < kMostWon ? f : Lanes{} + kMostWon;
+        lost *= y < 0 ? f : one;
       }));
     }
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/uniformity.h"
+
 namespace nullmark {
 namespace {
 
@@ -32,20 +34,6 @@ class Wealth {
  private:
   std::vector<Real> rates_, logs_;
 };
-
-/// -log of the probability bound 2 exp(-2 n D^2) on the largest distance D of n independent uniforms' distribution from the
-/// diagonal; -inf for none.
-Real uniformity(std::vector<Real>& u) {
-  if (u.empty()) return -kInfinity;
-  std::sort(u.begin(), u.end());
-  const auto n = static_cast<Real>(u.size());
-  Real distance = 0;
-  for (std::size_t i = 0; i < u.size(); ++i) {
-    const auto below = static_cast<Real>(i);
-    distance = std::max({distance, u[i] - below / n, (below + 1) / n - u[i]});
-  }
-  return 2 * n * distance * distance - std::log(Real{2});
-}
 
 /// All that the walks of the chosen rays tell.
 class LawTester {

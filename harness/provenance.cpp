@@ -90,6 +90,7 @@ std::map<std::string, std::string> make_provenance(const RunContext& context, st
           {"cpu", text({{"model", cpu_model()}, {"cores", std::thread::hardware_concurrency()}})},
           {"threads", text(context.threads)},
           {"verdict_share", context.verdict_share ? text(*context.verdict_share) : "null"},
+          {"statistics_share", context.statistics_share ? text(*context.statistics_share) : "null"},
           {"simd_bits", text(simd_bits())},
           {"libraries", text(libraries())},
           {"command_line", text(Json(context.command_line))},

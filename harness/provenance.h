@@ -12,8 +12,9 @@ namespace nullmark {
 /// What a run was made with and on: source, compiler, machine, libraries, command; values are JSON texts.  No host name.
 struct RunContext {
   std::vector<std::string> command_line;
-  int threads = 0;                      ///< cores used
-  std::optional<double> verdict_share;  ///< time of the verdicts' evidence over that of the sampling
+  int threads = 0;  ///< cores used
+  /// Time of the verdicts' evidence, and of all statistics, over that of the sampling.
+  std::optional<double> verdict_share, statistics_share;
   std::vector<std::uint64_t> seeds;
   std::chrono::system_clock::time_point start = std::chrono::system_clock::now();
 };

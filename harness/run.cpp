@@ -2,13 +2,20 @@
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
+#include <tbb/task_arena.h>
 
+#include <atomic>
 #include <chrono>
+#include <exception>
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <thread>
 
+#include "harness/background.h"
 #include "harness/free_path_law.h"
 #include "harness/image.h"
 #include "harness/laws.h"
@@ -215,13 +222,14 @@ void add_theory(std::vector<PreparedCell>& cells) {
     const bool plain = prepared.cell->measurement == Measurement{};
     if (prepared.reason.empty() && plain && prepared.kernel->states_theory()) by_scene[prepared.scene.get()].push_back(&prepared);
   }
-  for (auto& [scene, members] : by_scene) {
+  tbb::parallel_for_each(by_scene.begin(), by_scene.end(), [](auto& entry) {
+    auto& [scene, members] = entry;
     std::vector<TheoryQuery> queries;
     for (const PreparedCell* member : members)
       queries.push_back({member->kernel.get(), member->cell->quantity, member->range, &member->targets});
     const std::vector<CellTheory> theory = compute_theory(*scene, queries);
     for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
-  }
+  });
   for (PreparedCell& prepared : cells) {
     if (!prepared.cell->equal_lookups || !prepared.reason.empty()) continue;
     if (!prepared.theory.lookups || !(*prepared.theory.lookups > 0))
@@ -232,12 +240,19 @@ void add_theory(std::vector<PreparedCell>& cells) {
   }
 }
 
-/// What verdicts cost beside the sampling they judge.
+/// What verdicts and all statistics cost beside the sampling they are of.
 struct Effort {
-  double judging = 0, working = 0;
+  double judging = 0, statistics = 0, working = 0;
   Effort& operator+=(const Sampled& sampled) {
     judging += sampled.judging_seconds;
+    statistics += sampled.statistics_seconds;
     working += sampled.working_seconds;
+    return *this;
+  }
+  Effort& operator+=(const Effort& other) {
+    judging += other.judging;
+    statistics += other.statistics;
+    working += other.working;
     return *this;
   }
 };
@@ -327,7 +342,6 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
   verdict.samples_per_ray = prepared.samples_per_ray;
   std::uint64_t violations = sampled.counters.violations;
   verdict.out_of_range = sampled.out_of_range;
-  effort += sampled;
   std::uint64_t wanted = 0;
   for (const MeanTest& test : gate.tests)
     if (test.planned <= gate.affordable) wanted = std::max(wanted, test.planned);
@@ -549,6 +563,68 @@ std::vector<PreparedCell> prepare_all(Workshop& workshop, const Plan& plan, cons
   return cells;
 }
 
+struct CellOutcome {
+  CellRecord record;
+  Effort effort;
+};
+
+/// Samples and judges a cell.
+CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& families, bool late, const RunOptions& options,
+                     const RunObserver& observer, const std::function<bool()>& stop) {
+  CellOutcome outcome{blank_record(plan, prepared), {}};
+  CellRecord& record = outcome.record;
+  if (!prepared.reason.empty()) {
+    record.status = Status::skipped;
+    record.reason = prepared.reason;
+    return outcome;
+  }
+  if (stop() || late) {
+    record.reason = stop() ? "interrupted" : "time budget spent";
+    return outcome;
+  }
+  const auto progress = [&](double fraction) { observer.progress(record, fraction); };
+  const std::optional<CellGate> gate = gate_of(prepared, plan.levels, stop);
+  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
+                                   {0, prepared.samples_per_ray}, gate ? &*gate : nullptr, stop, progress);
+  if (sampled) outcome.effort += *sampled;
+  std::optional<VerdictRecord> verdict;
+  if (sampled && gate) verdict = judge(prepared, *gate, *sampled, plan.levels, families, outcome.effort, stop, progress);
+  if (!sampled || (gate && !verdict)) {
+    record.reason = "interrupted";
+    return outcome;
+  }
+  fill_statistics(record, prepared, *sampled);
+  if (record.status == Status::ok && verdict && verdict->nonfinite > 0) {
+    record.status = Status::error;
+    record.nonfinite += verdict->nonfinite;
+    record.reason = fmt::format("{} samples are not finite, among those drawn for the verdict", verdict->nonfinite);
+  }
+  if (record.status == Status::ok) record.verdict = verdict;
+  write_images(record, prepared, *sampled, options, observer);
+  return outcome;
+}
+
+/// Calls `work` for 0 .. count - 1, begun in this order, one on each thread; threads that find none left help with the chunks of
+/// those under way.  Throws what the first that failed threw; `failed` is then set, and no further ones are begun.
+template <class F>
+void for_each_in_order(std::size_t count, int threads, std::atomic<bool>& failed, F&& work) {
+  std::atomic<std::size_t> next = 0;
+  std::exception_ptr error;
+  const auto take = [&](int) {
+    for (std::size_t i = next++; i < count && !failed; i = next++) {
+      // An exception that reached TBB would cut the others' chunks short in silence.
+      try {
+        // While it waits for chunks of its own, a thread must not begin another cell.
+        tbb::this_task_arena::isolate([&] { work(i); });
+      } catch (...) {
+        if (!failed.exchange(true)) error = std::current_exception();
+      }
+    }
+  };
+  tbb::parallel_for(0, std::max(1, threads), take, tbb::simple_partitioner{});
+  if (error) std::rethrow_exception(error);
+}
+
 }  // namespace
 
 std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
@@ -565,7 +641,6 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
 
   const bool timing = options.timing && plan.timing.enabled;
   const Families families{mean_family(plan), lookups_family(plan), laws_family(plan)};
-  Effort effort;
   Workshop workshop(plan);
   std::vector<PreparedCell> cells =
       prepare_all(workshop, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
@@ -576,42 +651,41 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
   });
   if (!stop()) add_theory(cells);
 
+  std::vector<CellOutcome> outcomes(cells.size());
+  {
+    std::mutex telling;
+    Background teller;
+    std::size_t done = 0;
+    std::atomic<bool> failed = false;
+    const auto given_up = [&] { return stop() || failed || teller.failed(); };
+    RunObserver guarded = observer;
+    guarded.warning = [&](const std::string& message) {
+      const std::lock_guard lock(telling);
+      observer.warning(message);
+    };
+    // Some progress untold is better than samples that wait.
+    guarded.progress = [&](const CellRecord& record, double fraction) {
+      if (const std::unique_lock lock(telling, std::try_to_lock); lock) observer.progress(record, fraction);
+    };
+    for_each_in_order(cells.size(), threads, failed, [&](std::size_t i) {
+      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      const bool late = options.time_budget && seconds > *options.time_budget;
+      outcomes[i] = run_cell(plan, cells[i], families, late, options, guarded, given_up);
+      teller.add([&, i] {
+        const std::lock_guard lock(telling);
+        observer.cell_done(outcomes[i].record, ++done, cells.size());
+      });
+    });
+    teller.finish();
+  }
+
   std::vector<const PreparedCell*> to_time;
   for (const PreparedCell& prepared : untimed) to_time.push_back(&prepared);
-  std::size_t done = 0;
-  for (PreparedCell& prepared : cells) {
-    CellRecord record = blank_record(plan, prepared);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (!prepared.reason.empty()) {
-      record.status = Status::skipped;
-      record.reason = prepared.reason;
-    } else if (stop()) {
-      record.reason = "interrupted";
-    } else if (options.time_budget && seconds > *options.time_budget) {
-      record.reason = "time budget spent";
-    } else {
-      const auto progress = [&](double fraction) { observer.progress(record, fraction); };
-      const std::optional<CellGate> gate = gate_of(prepared, plan.levels, stop);
-      const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                                       {0, prepared.samples_per_ray}, gate ? &*gate : nullptr, stop, progress);
-      std::optional<VerdictRecord> verdict;
-      if (sampled && gate) verdict = judge(prepared, *gate, *sampled, plan.levels, families, effort, stop, progress);
-      if (!sampled || (gate && !verdict)) {
-        record.reason = "interrupted";
-      } else {
-        fill_statistics(record, prepared, *sampled);
-        if (record.status == Status::ok && verdict && verdict->nonfinite > 0) {
-          record.status = Status::error;
-          record.nonfinite += verdict->nonfinite;
-          record.reason = fmt::format("{} samples are not finite, among those drawn for the verdict", verdict->nonfinite);
-        }
-        if (record.status == Status::ok) record.verdict = verdict;
-        write_images(record, prepared, *sampled, options, observer);
-        if (record.status == Status::ok) to_time.push_back(&prepared);
-      }
-    }
-    records[prepared.index] = record;
-    observer.cell_done(record, ++done, cells.size());
+  Effort effort;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    effort += outcomes[i].effort;
+    if (outcomes[i].record.status == Status::ok) to_time.push_back(&cells[i]);
+    records[cells[i].index] = std::move(outcomes[i].record);
   }
 
   if (timing && !to_time.empty() && !stop()) {
@@ -626,7 +700,10 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
       observer.cell_timed(record);
     }
   }
-  if (effort.working > 0) observer.verdict_share(effort.judging / (effort.working - effort.judging));
+  if (effort.working > 0) {
+    observer.verdict_share(effort.judging / (effort.working - effort.judging));
+    observer.statistics_share(effort.statistics / (effort.working - effort.statistics));
+  }
   std::vector<CellRecord> result;
   for (auto& [index, record] : records) result.push_back(std::move(record));
   return result;

@@ -5,7 +5,10 @@
 
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <map>
+
+#include "harness/lanes.h"
 
 namespace nullmark {
 namespace {
@@ -42,14 +45,20 @@ struct ChunkResult {
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
   std::map<std::size_t, Evidence> evidence;  ///< by test; a chunk touches few of them
-  Clock::duration judging{}, working{};
+  Clock::duration judging{}, statistics{}, working{};
 };
 
 /// Errors on their way to the tests of a gate: summed in short runs, gathered over rays, and bet on by the thousand.
 class Evidences {
  public:
-  Evidences(const CellGate* gate, std::size_t channels, std::map<std::size_t, Evidence>& out)
-      : gate_(gate), out_(out), pooled_(channels), grouped_(channels) {
+  /// Kept from chunk to chunk: fresh pages cost more than what is written to them.
+  struct Memory {
+    std::vector<std::vector<Real>> pending;  ///< by test
+    std::vector<Real> sums;
+  };
+
+  Evidences(const CellGate* gate, std::size_t channels, Memory& memory, std::map<std::size_t, Evidence>& out)
+      : gate_(gate), out_(out), pooled_(channels), grouped_(channels), pending_(memory.pending), sums_(memory.sums) {
     if (!gate_) return;
     pending_.resize(gate_->tests.size());
     for (std::size_t i = 0; i < gate_->tests.size(); ++i) {
@@ -69,16 +78,24 @@ class Evidences {
   void add_errors(std::size_t ray, std::size_t channel, std::span<const Real> errors) {
     if (!gate_ || !pooled_[channel]) return;
     sum(errors, gate_->errors_per_sum);
-    feed(*pooled_[channel], errors);
-    if (!grouped_[channel].empty()) feed(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])], errors);
+    const auto largest = [&] {
+      Real most = 0;
+      for (const Real error : errors) most = std::max(most, std::abs(error));
+      return most;
+    };
+    feed(*pooled_[channel], largest);
+    if (!grouped_[channel].empty()) feed(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])], largest);
   }
 
   void add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups) {
-    if (!gate_ || !lookups_) return;
-    errors_.resize(lookups.size());
-    for (std::size_t i = 0; i < lookups.size(); ++i) errors_[i] = static_cast<Real>(lookups[i]) - gate_->lookups[ray];
-    sum(errors_, gate_->lookups_per_sum);
-    feed(*lookups_, errors_);
+    if (!gate_ || !lookups_ || lookups.empty()) return;
+    sum(lookups, gate_->lookups_per_sum);
+    const Real expected = gate_->lookups[ray];
+    for (Real& sum : sums_) sum -= expected * gate_->lookups_per_sum;
+    feed(*lookups_, [&] {
+      const auto [least, most] = std::minmax_element(lookups.begin(), lookups.end());
+      return std::max(expected - *least, *most - expected);
+    });
   }
 
   void finish() {
@@ -89,17 +106,19 @@ class Evidences {
   static constexpr std::size_t kTogether = 8192, kEnough = 2048;
 
   /// Which errors share a sum is free; a stride lets all sums advance together.
-  void sum(std::span<const Real> errors, int together) {
+  template <class Number>
+  void sum(std::span<const Number> errors, int together) {
     const std::size_t count = errors.size() / static_cast<std::size_t>(together);
     sums_.assign(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(count));
     for (std::size_t k = 1; k < static_cast<std::size_t>(together); ++k)
-      for (std::size_t j = 0; j < count; ++j) sums_[j] += errors[k * count + j];
+      for (std::size_t j = 0; j < count; ++j) sums_[j] += static_cast<Real>(errors[k * count + j]);
   }
 
-  void feed(std::size_t test, std::span<const Real> errors) {
+  template <class Largest>
+  void feed(std::size_t test, Largest largest_error) {
     Evidence& evidence = out_[test];
     if (gate_->tests[test].deterministic) {
-      for (const Real error : errors) evidence.largest_error = std::max(evidence.largest_error, std::abs(error));
+      evidence.largest_error = std::max(evidence.largest_error, largest_error());
       evidence.sums += sums_.size();
       return;
     }
@@ -127,8 +146,8 @@ class Evidences {
   std::vector<std::optional<std::size_t>> pooled_;                // test by channel
   std::vector<std::vector<std::optional<std::size_t>>> grouped_;  // by channel and group
   std::optional<std::size_t> lookups_;
-  std::vector<std::vector<Real>> pending_;  // by test
-  std::vector<Real> sums_, errors_;
+  std::vector<std::vector<Real>>& pending_;
+  std::vector<Real>& sums_;
 };
 
 std::vector<Chunk> cut(std::size_t rays, std::uint64_t samples, std::uint64_t chunk) {
@@ -151,11 +170,46 @@ struct Scratch {
   std::unique_ptr<Workspace> workspace;
   RayContext context;
   SampleBlock block;
-  std::vector<Real> errors;
+  std::vector<Real> errors, finite;
+  Evidences::Memory evidence;
 };
 
 /// Rounding allowed to samples at the ends of their declared range.
 constexpr Real kRangeSlack = 1e-9;
+
+/// errors = values - reference; whether all values lie in [low, high], which none does that is not finite.
+bool subtract(const Real* values, Real reference, Real low, Real high, std::span<Real> errors) {
+  Lanes value{};
+  auto inside = value == value;
+  std::size_t i = 0;
+  for (; i + kLanes <= errors.size(); i += kLanes) {
+    load(values + i, value);
+    inside &= (value >= low) & (value <= high);
+    store(value - reference, &errors[i]);
+  }
+  bool all = true;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) all &= inside[lane] != 0;
+  for (; i < errors.size(); ++i) {
+    all &= values[i] >= low && values[i] <= high;
+    errors[i] = values[i] - reference;
+  }
+  return all;
+}
+
+Real sum_of_squares(std::span<const std::uint32_t> counts) {
+  using Counts [[gnu::vector_size(kLanes * sizeof(std::uint32_t))]] = std::uint32_t;
+  Lanes sum{};
+  Counts each;
+  std::size_t i = 0;
+  for (; i + kLanes <= counts.size(); i += kLanes) {
+    std::memcpy(&each, &counts[i], sizeof each);
+    const Lanes count = __builtin_convertvector(each, Lanes);
+    sum += count * count;
+  }
+  Real result = total(sum);
+  for (; i < counts.size(); ++i) result += static_cast<Real>(counts[i]) * counts[i];
+  return result;
+}
 
 }  // namespace
 
@@ -197,6 +251,38 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     };
     return fresh;
   });
+  // Fills `errors` of an output, 0 for samples that are not finite, and tells those that count.
+  constexpr Real kLargest = std::numeric_limits<Real>::max();
+  const Real low = gate ? std::max(gate->low - kRangeSlack, -kLargest) : -kLargest;
+  const Real high = gate ? std::min(gate->high + kRangeSlack, kLargest) : kLargest;
+  const bool as_drawn = cell.measurement == Measurement{};
+  const auto take_errors = [&](Scratch& mine, std::size_t o, Real target, std::span<Real> errors,
+                               ChunkResult& out) -> std::span<const Real> {
+    const std::vector<Real>& values = mine.block.values;
+    const Real reference = span.about_zero ? 0 : measured(target, cell.measurement);
+    if (as_drawn) {
+      const Real* drawn = values.data();
+      if (outputs > 1) {
+        mine.finite.resize(errors.size());
+        for (std::size_t i = 0; i < errors.size(); ++i) mine.finite[i] = values[i * outputs + o];
+        drawn = mine.finite.data();
+      }
+      if (subtract(drawn, reference, low, high, errors)) return errors;
+    }
+    mine.finite.clear();
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      const Real value = values[i * outputs + o];
+      errors[i] = 0;
+      if (!std::isfinite(value)) {
+        ++out.nonfinite;
+        continue;
+      }
+      out.out_of_range += !(value >= low && value <= high);
+      errors[i] = measured(value, cell.measurement) - reference;
+      mine.finite.push_back(errors[i]);
+    }
+    return mine.finite;
+  };
   std::atomic<std::size_t> done = 0;
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t at) {
     if (stopped || stop()) {
@@ -212,7 +298,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     out.groups.resize(outputs);
     out.group_sums.assign(outputs, 0);
     const auto begun = Clock::now();
-    Evidences evidences(gate, outputs, out.evidence);
+    Evidences evidences(gate, outputs, mine.evidence, out.evidence);
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
       scene.context(ray, kernel, mine.context);
       kernel.begin_ray(*mine.workspace, *scene.medium->medium, scene.medium->extrema, mine.context);
@@ -223,31 +309,27 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         const std::uint64_t batch = std::min(kBatch, chunk.count - drawn);
         kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, span.first + chunk.first + drawn, batch,
                       cell.quantity, mine.block, out.counters);
+        const auto drawn_at = Clock::now();
         mine.errors.resize(batch * outputs);
         for (std::size_t o = 0; o < outputs; ++o) {
-          Moments& moments = out.moments[local * outputs + o];
-          const Real reference = measured(targets.mean[ray * outputs + o], cell.measurement);
-          const Real shift = gate ? gate->shift[ray * outputs + o] : 0;
-          for (std::size_t i = 0; i < batch; ++i) {
-            const Real value = mine.block.values[i * outputs + o];
-            mine.errors[o * batch + i] = 0;
-            if (!std::isfinite(value)) {
-              ++out.nonfinite;
-              continue;
-            }
-            if (gate && !(value >= gate->low - kRangeSlack && value <= gate->high + kRangeSlack)) ++out.out_of_range;
-            const Real error = measured(value, cell.measurement) - reference;
-            const Real counted = span.about_zero ? value : error;
-            moments.add(counted);
-            out.groups[o].add(counted);
-            mine.errors[o * batch + i] = error - shift;
-          }
+          const Real target = targets.mean[ray * outputs + o];
+          const std::span<Real> errors(&mine.errors[o * batch], batch);
+          const std::span<const Real> counted = take_errors(mine, o, target, errors, out);
+          out.moments[local * outputs + o].add(counted);
+          out.groups[o].add(counted);
         }
-        const auto judging = Clock::now();
-        for (std::size_t o = 0; o < outputs && gate; ++o) evidences.add_errors(ray, o, {&mine.errors[o * batch], batch});
+        out.lookups_squared[local] += sum_of_squares(mine.block.lookups);
+        const auto counted_at = Clock::now();
+        for (std::size_t o = 0; o < outputs && gate; ++o) {
+          const std::span<Real> errors(&mine.errors[o * batch], batch);
+          if (const Real shift = gate->shift[ray * outputs + o]; shift != 0)
+            for (Real& error : errors) error -= shift;
+          evidences.add_errors(ray, o, errors);
+        }
         evidences.add_lookups(ray, mine.block.lookups);
-        out.judging += Clock::now() - judging;
-        for (const std::uint32_t n : mine.block.lookups) out.lookups_squared[local] += static_cast<Real>(n) * n;
+        const auto judged_at = Clock::now();
+        out.statistics += judged_at - drawn_at;
+        out.judging += judged_at - counted_at;
       }
       out.lookups[local] = out.counters.lookups - lookups_before;
       for (std::size_t o = 0; o < outputs; ++o) {
@@ -255,10 +337,12 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         out.groups[o].finish_ray();
       }
     }
-    const auto judging = Clock::now();
+    const auto drawn_at = Clock::now();
     evidences.finish();
-    out.judging += Clock::now() - judging;
-    out.working += Clock::now() - begun;
+    const auto judged_at = Clock::now();
+    out.statistics += judged_at - drawn_at;
+    out.judging += judged_at - drawn_at;
+    out.working += judged_at - begun;
     progress(static_cast<double>(++done) / static_cast<double>(chunks.size()));
   });
   if (stopped) return std::nullopt;
@@ -282,6 +366,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     result.counters += part.counters;
     result.nonfinite += part.nonfinite;
     result.out_of_range += part.out_of_range;
+    result.statistics_seconds += std::chrono::duration<double>(part.statistics).count();
     result.judging_seconds += std::chrono::duration<double>(part.judging).count();
     result.working_seconds += std::chrono::duration<double>(part.working).count();
     for (const auto& [test, evidence] : part.evidence) result.evidence[test] += evidence;

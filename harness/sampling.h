@@ -19,8 +19,9 @@ struct Sampled {
   std::vector<GroupErrors> groups;     ///< per output
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
-  std::vector<Evidence> evidence;                   ///< one per test of the gate
-  double judging_seconds = 0, working_seconds = 0;  ///< of all threads: evidence alone, and everything
+  std::vector<Evidence> evidence;  ///< one per test of the gate
+  /// Of all threads: evidence alone; all that is done with samples once they are drawn; everything.
+  double judging_seconds = 0, statistics_seconds = 0, working_seconds = 0;
 };
 
 /// Which of a cell's samples: first .. first + per_ray - 1 of every ray.

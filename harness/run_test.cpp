@@ -1,0 +1,85 @@
+// What a run keeps whatever the number of threads: every cell told of once, results in the plan's order, errors not swallowed.
+
+#include "harness/run.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <stdexcept>
+
+#include "harness/config.h"
+
+namespace nullmark {
+namespace {
+
+Plan plan() {
+  return read_config(R"({"$schema":"nullmark/config/1","name":"test","timing":{"enabled":false},
+      "experiments":[{"name":"cells","rays":{"type":"orthographic","width":5,"height":4},
+        "matrix":{"samples_per_ray":[2,64,1000],"estimator":["ratio","delta","next_flight_ratio"],
+                  "medium":[{"type":"cosine","optical_depth":[0.5,2]},{"type":"linear","optical_depth":[0.5,1]}]}}]})",
+                     "test.json");
+}
+
+std::vector<CellRecord> run(const Plan& plan, int threads, const RunObserver& observer) {
+  RunOptions options;
+  options.threads = threads;
+  options.timing = false;
+  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, observer);
+}
+
+TEST(Run, TellsOfEveryCellOnceAndOneAtATime) {
+  const Plan cells = plan();
+  for (const int threads : {1, 4}) {
+    RunObserver observer;
+    std::vector<std::string> told;
+    std::atomic<int> telling = 0;
+    observer.cell_done = [&](const CellRecord& record, std::size_t done, std::size_t total) {
+      EXPECT_EQ(++telling, 1);
+      told.push_back(record.cell.id);
+      EXPECT_EQ(done, told.size());
+      EXPECT_EQ(total, cells.cells.size());
+      --telling;
+    };
+    observer.progress = [&](const CellRecord&, double fraction) {
+      EXPECT_EQ(++telling, 1);
+      EXPECT_TRUE(fraction > 0 && fraction <= 1);
+      --telling;
+    };
+    const std::vector<CellRecord> records = run(cells, threads, observer);
+    ASSERT_EQ(records.size(), cells.cells.size());
+    std::vector<std::string> ids;
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      EXPECT_EQ(records[i].cell.id, cells.cells[i].id);
+      EXPECT_EQ(records[i].status, Status::ok);
+      ids.push_back(records[i].cell.id);
+    }
+    std::sort(ids.begin(), ids.end());
+    std::sort(told.begin(), told.end());
+    EXPECT_EQ(told, ids);
+  }
+}
+
+TEST(Run, AnObserverThatThrowsEndsIt) {
+  const Plan cells = plan();
+  RunObserver observer;
+  std::size_t told = 0;
+  observer.cell_done = [&](const CellRecord&, std::size_t, std::size_t) {
+    if (++told == 3) throw std::runtime_error("disk full");
+  };
+  EXPECT_THROW(run(cells, 4, observer), std::runtime_error);
+  EXPECT_EQ(told, 3u);
+}
+
+TEST(Run, StatisticsHoldTheVerdict) {
+  RunObserver observer;
+  double verdict = -1, statistics = -1;
+  observer.verdict_share = [&](double share) { verdict = share; };
+  observer.statistics_share = [&](double share) { statistics = share; };
+  run(plan(), 2, observer);
+  EXPECT_GT(verdict, 0);
+  EXPECT_GT(statistics, verdict);
+}
+
+}  // namespace
+}  // namespace nullmark
