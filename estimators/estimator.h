@@ -31,6 +31,11 @@ inline constexpr std::size_t kQuantities = 5;
 /// majorant depth of its ray; means over samples are taken in double.
 enum class Precision { float64, float32 };
 
+/// Distance from 1 to the next number.
+constexpr Real epsilon_of(Precision precision) {
+  return precision == Precision::float64 ? std::numeric_limits<Real>::epsilon() : Real{std::numeric_limits<float>::epsilon()};
+}
+
 /// Exact moments of one sample, where known; lookups are their expectation.
 struct Theory {
   std::optional<Real> mean{};  ///< left out: the quantity itself

@@ -63,6 +63,7 @@ class CommandLine {
     add_run();
     add_check();
     add_compare();
+    add_gate();
     add_list();
     add_schema();
     add_export();
@@ -150,6 +151,23 @@ class CommandLine {
     command->add_option("--baseline", baseline_, "Estimator to compare the others with");
   }
 
+  void add_gate() {
+    CLI::App* command = add("gate", "Compare what cells cost with a baseline; exit code 4 where a regression is proven",
+                            [this] { return gate_command(gate_); });
+    command->add_option("--baseline", gate_.baseline, "Results, a baseline, or a folder of baselines")->required();
+    command->add_option("RESULTS", gate_.results, "Results file")->required();
+    command
+        ->add_option("--threshold", gate_.threshold,
+                     "Percent that a change must exceed, in place of the tiers' own: 0, 1, .2 to 1 (by history), 5")
+        ->check(CLI::Range(0., 1000.));
+    CLI::Option* blocks = command->add_option("--blocks", gate_.blocks, "Folder of scripts/compare-builds: wall time as well");
+    command->add_flag("--quiet-machine", gate_.quiet_machine, "Slower wall time is a regression, not only a remark")
+        ->needs(blocks);
+    command->add_flag("--update", gate_.update, "Make the results the baseline")->excludes(blocks);
+    command->add_option("--junit", gate_.junit, "Also write a JUnit report");
+    command->add_option("--markdown", gate_.markdown, "Also write a summary for a pull request");
+  }
+
   void add_list() {
     CLI::App* command =
         add("list", "List what configurations may name, with parameters and sources", [this] { return list_command(list_); });
@@ -208,6 +226,7 @@ class CommandLine {
   CLI::App app_{"Benchmark and validation harness for null-collision trackers", "nullmark"};
   std::function<ExitCode()> action_;
   RunCommand run_;
+  GateCommand gate_;
   ListCommand list_;
   ProceduralVdb volume_;
   std::vector<std::string> files_;

@@ -22,6 +22,17 @@ struct RunCommand {
 };
 ExitCode run_command(const RunCommand& command);
 
+/// `nullmark gate`.
+struct GateCommand {
+  std::string baseline;             ///< results, a baseline, or a folder of baselines
+  std::string results;              ///< of `nullmark run`
+  std::optional<double> threshold;  ///< percent, in place of the tiers' own
+  std::string blocks;               ///< folder of interleaved runs; empty: no wall time
+  std::string junit, markdown;      ///< files; empty: none
+  bool update = false, quiet_machine = false;
+};
+ExitCode gate_command(const GateCommand& command);
+
 /// `nullmark list`.
 struct ListCommand {
   std::string what;  ///< "estimators", "media", "majorants", "rays" or "quantities"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "harness/lanes.h"
+#include "harness/eight.h"
 #include "media/elementary.h"
 
 namespace nullmark {
@@ -19,7 +19,7 @@ constexpr std::size_t kTogether = 32;
 class Products {
  public:
   /// Takes x > 0, finite; by x^-1 where `sign` is -1.
-  void multiply(Lanes x, int sign) {
+  void multiply(Eight x, int sign) {
     take_exponent(x, sign);
     mantissa_ = sign > 0 ? mantissa_ * x : mantissa_ / x;
     take_exponent(mantissa_, 1);
@@ -27,12 +27,12 @@ class Products {
 
   /// Sum of the logarithms of all lanes.
   Real log() const {
-    std::array<Real, kLanes> negative;
+    std::array<Real, kEight> negative;
     store(mantissa_, negative.data());
-    negative_logarithms(negative.data(), kLanes, negative.data());
+    negative_logarithms(negative.data(), kEight, negative.data());
     Real sum = 0;
     std::int64_t exponents = 0;
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    for (std::size_t lane = 0; lane < kEight; ++lane) {
       sum -= negative[lane];
       exponents += exponent_[lane];
     }
@@ -40,9 +40,9 @@ class Products {
   }
 
  private:
-  using Integers [[gnu::vector_size(sizeof(Lanes))]] = std::int64_t;
+  using Integers [[gnu::vector_size(sizeof(Eight))]] = std::int64_t;
 
-  void take_exponent(Lanes& x, int sign) {
+  void take_exponent(Eight& x, int sign) {
     constexpr int kFraction = 52;
     constexpr std::int64_t kBias = 1023;
     Integers bits;
@@ -52,7 +52,7 @@ class Products {
     std::memcpy(&x, &bits, sizeof bits);
   }
 
-  Lanes mantissa_ = Lanes{} + 1;
+  Eight mantissa_ = Eight{} + 1;
   Integers exponent_{};
 };
 
@@ -63,23 +63,23 @@ Real sum_of_logs(std::span<const Real> sums, Real neutral, Factor factor) {
   // A wealth that is lost for good; what this adds to its expectation is nothing.
   constexpr Real kLost = 1e-300;
   constexpr std::size_t kChains = 4;  // that do not wait for each other
-  const Lanes least = Lanes{} + kLost, most = Lanes{} + 1 / kLost;
+  const Eight least = Eight{} + kLost, most = Eight{} + 1 / kLost;
   Products products;
   for (std::size_t i = 0; i < sums.size();) {
-    std::array<Lanes, kChains> won, lost;
-    won.fill(Lanes{} + 1);
-    lost.fill(Lanes{} + 1);
-    Lanes x;
-    for (std::size_t k = 0; k < kTogether && i + kChains * kLanes <= sums.size(); ++k)
-      for (std::size_t chain = 0; chain < kChains; ++chain, i += kLanes) {
+    std::array<Eight, kChains> won, lost;
+    won.fill(Eight{} + 1);
+    lost.fill(Eight{} + 1);
+    Eight x;
+    for (std::size_t k = 0; k < kTogether && i + kChains * kEight <= sums.size(); ++k)
+      for (std::size_t chain = 0; chain < kChains; ++chain, i += kEight) {
         load(&sums[i], x);
         factor(x, won[chain], lost[chain]);
       }
-    if (sums.size() - i < kChains * kLanes)
-      for (std::size_t chain = 0; i < sums.size(); ++chain, i += kLanes) {
-        std::array<Real, kLanes> rest;
+    if (sums.size() - i < kChains * kEight)
+      for (std::size_t chain = 0; i < sums.size(); ++chain, i += kEight) {
+        std::array<Real, kEight> rest;
         rest.fill(neutral);
-        std::copy_n(&sums[i], std::min(kLanes, sums.size() - i), rest.data());
+        std::copy_n(&sums[i], std::min(kEight, sums.size() - i), rest.data());
         load(rest.data(), x);
         factor(x, won[chain], lost[chain]);
       }
@@ -100,14 +100,14 @@ std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums, int errors_
     const Real l = rate * bet.side;
     const Real start = -l * shift;
     if (bet.kind == Bet::Kind::betting) {
-      logs.push_back(sum_of_logs(sums, shift, [=](const Lanes& x, Lanes& won, Lanes&) {
-        const Lanes f = (1 + start) + l * x;
-        won *= f < kMostWon ? f : Lanes{} + kMostWon;
+      logs.push_back(sum_of_logs(sums, shift, [=](const Eight& x, Eight& won, Eight&) {
+        const Eight f = (1 + start) + l * x;
+        won *= f < kMostWon ? f : Eight{} + kMostWon;
       }));
     } else {
-      logs.push_back(sum_of_logs(sums, shift, [=](const Lanes& x, Lanes& won, Lanes& lost) {
-        const Lanes one = Lanes{} + 1, y = start + l * x, size = y < 0 ? -y : y, f = 1 + size * (1 + size / 2);
-        won *= y < 0 ? one : f < kMostWon ? f : Lanes{} + kMostWon;
+      logs.push_back(sum_of_logs(sums, shift, [=](const Eight& x, Eight& won, Eight& lost) {
+        const Eight one = Eight{} + 1, y = start + l * x, size = y < 0 ? -y : y, f = 1 + size * (1 + size / 2);
+        won *= y < 0 ? one : f < kMostWon ? f : Eight{} + kMostWon;
         lost *= y < 0 ? f : one;
       }));
     }

@@ -215,7 +215,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
   const bool bounded = std::isfinite(gate.low) && std::isfinite(gate.high);
   const bool distrusted = !analytic && !bounded && pilot->variance_of_variance >= kTrustedVariance;
   std::vector<Pool> pools;
-  constexpr Real kUlp = std::numeric_limits<Real>::epsilon();
+  const Real ulp = epsilon_of(cell.precision);
   const Real mean_lookups = theory.lookups.value_or(0);
   for (std::size_t o = 0; o < outputs; ++o) {
     std::vector<Pool> by_group(static_cast<std::size_t>(groups) + 1);
@@ -246,7 +246,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
       test.reference_error = pool.reference_error / n;
       test.variance = pool.variance / n;
       const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0;
-      test.rounding = 64 * kUlp * (1 + mean_lookups + depth) * std::max(std::abs(pool.most), std::abs(pool.least));
+      test.rounding = 64 * ulp * (1 + mean_lookups + depth) * std::max(std::abs(pool.most), std::abs(pool.least));
       // Rare events that a pilot did not see are no proof of a zero variance.
       test.deterministic = analytic && !(test.variance > kSurely * test.rounding * test.rounding);
       if (!analytic && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);

@@ -4,13 +4,11 @@
 #include <string_view>
 
 #include "harness/expectation.h"
-#include "harness/expectation.h"
 #include "harness/order.h"
 #include "harness/results_json.h"
 #include "harness/verdict_json.h"
 
 namespace nullmark {
-namespace {
 
 std::string xml(const std::string& text) {
   std::string result;
@@ -33,6 +31,8 @@ std::string xml(const std::string& text) {
     }
   return result;
 }
+
+namespace {
 
 std::string shell_quoted(const std::string& text) {
   std::string result = "'";

@@ -6,6 +6,9 @@
 
 namespace nullmark {
 
+/// Text as XML writes it, in attributes too.
+std::string xml(const std::string& text);
+
 /// The shell command that runs a cell again from the configuration that its results file holds.
 std::string reproduction(const CellRecord& record, const std::string& file);
 

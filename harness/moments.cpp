@@ -2,15 +2,15 @@
 
 #include <array>
 
-#include "harness/lanes.h"
+#include "harness/eight.h"
 
 namespace nullmark {
 namespace {
 
 Real sum_of_squares(std::span<const Real> x) {
-  Lanes sum{}, each;
+  Eight sum{}, each;
   std::size_t i = 0;
-  for (; i + kLanes <= x.size(); i += kLanes) {
+  for (; i + kEight <= x.size(); i += kEight) {
     load(&x[i], each);
     sum += each * each;
   }
@@ -21,12 +21,12 @@ Real sum_of_squares(std::span<const Real> x) {
 
 /// sums[j] = x[2j] + x[2j + 1]; returns the sum of their squares.
 Real add_pairs(const Real* x, std::size_t pairs, Real* sums) {
-  Lanes squares{}, low, high;
+  Eight squares{}, low, high;
   std::size_t j = 0;
-  for (; j + kLanes <= pairs; j += kLanes) {
+  for (; j + kEight <= pairs; j += kEight) {
     load(x + 2 * j, low);
-    load(x + 2 * j + kLanes, high);
-    const Lanes sum = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14) +
+    load(x + 2 * j + kEight, high);
+    const Eight sum = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14) +
                       __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
     store(sum, sums + j);
     squares += sum * sum;
@@ -42,11 +42,11 @@ Real add_pairs(const Real* x, std::size_t pairs, Real* sums) {
 }  // namespace
 
 void Moments::add(std::span<const Real> errors) {
-  Lanes first{}, second{}, third{}, fourth{}, error;
+  Eight first{}, second{}, third{}, fourth{}, error;
   std::size_t i = 0;
-  for (; i + kLanes <= errors.size(); i += kLanes) {
+  for (; i + kEight <= errors.size(); i += kEight) {
     load(&errors[i], error);
-    const Lanes square = error * error;
+    const Eight square = error * error;
     first += error;
     second += square;
     third += square * error;

@@ -3,6 +3,7 @@
 #include <features.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <hwy/highway.h>
 #include <openvdb/version.h>
 #include <tbb/version.h>
 
@@ -61,6 +62,9 @@ constexpr int simd_bits() {
 #endif
 }
 
+/// Lanes that vectorised code was compiled for; what -march promises can still leave a target out.
+const char* simd_target() { return hwy::TargetName(HWY_STATIC_TARGET); }
+
 Json libraries() {
   return {{"openvdb", OPENVDB_LIBRARY_VERSION_STRING},
           {"tbb", TBB_VERSION_STRING},
@@ -92,6 +96,7 @@ std::map<std::string, std::string> make_provenance(const RunContext& context, st
           {"verdict_share", context.verdict_share ? text(*context.verdict_share) : "null"},
           {"statistics_share", context.statistics_share ? text(*context.statistics_share) : "null"},
           {"simd_bits", text(simd_bits())},
+          {"target", text({{"march", NULLMARK_ARCH}, {"simd", simd_target()}})},
           {"libraries", text(libraries())},
           {"command_line", text(Json(context.command_line))},
           {"seeds", text(Json(context.seeds))},

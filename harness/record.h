@@ -112,6 +112,9 @@ struct CellRecord {
   std::vector<ChannelRecord> channel;
   std::optional<Real> lookups_per_sample, lookups_theory, null_collisions_per_sample, draws_per_sample;
   std::uint64_t lookups = 0, draws = 0;  ///< exact totals
+  /// Of one sample's lookups, averaged over the rays; where every ray has one sample, over all of them, which is more.
+  std::optional<Real> lookups_variance;
+  std::optional<std::uint64_t> instructions;  ///< that drawing the samples took, counted in a simulator; see performance_gate.md
   std::uint64_t majorant_violations = 0, nonfinite = 0;
   std::optional<Real> largest_violation;  ///< max mu / mub seen beyond 1
   std::optional<TimeRecord> time;

@@ -304,6 +304,7 @@ Json cell_json(const CellRecord& record) {
       {"rng_draws_per_sample", real(record.draws_per_sample)},
       {"lookups", record.lookups},
       {"rng_draws", record.draws},
+      {"lookups_variance", real(record.lookups_variance)},
       {"majorant_violations", record.majorant_violations},
       {"largest_violation", real(record.largest_violation)},
       {"nonfinite", record.nonfinite},
@@ -312,6 +313,7 @@ Json cell_json(const CellRecord& record) {
       {"efficiency", {{"variance_x_lookups", per_channel(record, [&](std::size_t c) { return variance_x_lookups(record, c); })}}},
       {"convergence", convergence_json(record)},
       {"image_maximum", real(cell.image_maximum)}});
+  if (record.instructions) json["instructions"] = *record.instructions;
   if (cell.images) json["images"] = record.images;
   return json;
 }
@@ -362,6 +364,8 @@ CellRecord read_cell(const Place& place) {
   record.draws_per_sample = optional_real(place, "rng_draws_per_sample");
   record.lookups = count(place, "lookups");
   record.draws = count(place, "rng_draws");
+  record.lookups_variance = optional_real(place, "lookups_variance");
+  if (place.has("instructions")) record.instructions = count(place, "instructions");
   record.majorant_violations = count(place, "majorant_violations");
   record.largest_violation = optional_real(place, "largest_violation");
   record.nonfinite = count(place, "nonfinite");
@@ -418,6 +422,7 @@ std::string statistics_text(const RunRecord& run) {
   for (const CellRecord& record : run.cells) {
     Json json = cell_json(record);
     json.erase("time");
+    json.erase("instructions");
     json.erase("images");
     text += json.dump() + "\n";
   }

@@ -419,6 +419,21 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
   return record;
 }
 
+/// See CellRecord::lookups_variance.
+std::optional<Real> lookups_variance(const Sampled& sampled, Real samples_per_ray) {
+  Real within = 0, squares = 0, lookups = 0;
+  for (std::size_t ray = 0; ray < sampled.lookups.size(); ++ray) {
+    const auto of_ray = static_cast<Real>(sampled.lookups[ray]);
+    within += sampled.lookups_squared[ray] - of_ray * of_ray / samples_per_ray;
+    squares += sampled.lookups_squared[ray];
+    lookups += of_ray;
+  }
+  const auto rays = static_cast<Real>(sampled.lookups.size()), all = rays * samples_per_ray;
+  if (samples_per_ray > 1) return finite(std::max<Real>(0, within / (rays * (samples_per_ray - 1))));
+  if (all > 1) return finite(std::max<Real>(0, (squares - lookups * lookups / all) / (all - 1)));
+  return std::nullopt;
+}
+
 void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled) {
   const Cell& cell = *prepared.cell;
   const auto rays = static_cast<std::size_t>(record.rays);
@@ -434,6 +449,7 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
   record.draws_per_sample = static_cast<Real>(record.draws) / total;
   record.null_collisions_per_sample = static_cast<Real>(sampled.counters.null_collisions) / total;
   record.lookups_theory = prepared.theory.lookups;
+  record.lookups_variance = lookups_variance(sampled, samples);
   record.majorant_violations = sampled.counters.violations;
   if (sampled.counters.violations > 0) record.largest_violation = finite(sampled.counters.largest_violation);
   record.nonfinite = sampled.nonfinite;

@@ -8,7 +8,7 @@
 #include <limits>
 #include <map>
 
-#include "harness/lanes.h"
+#include "harness/eight.h"
 
 namespace nullmark {
 namespace {
@@ -175,20 +175,20 @@ struct Scratch {
 };
 
 /// Rounding allowed to samples at the ends of their declared range.
-constexpr Real kRangeSlack = 1e-9;
+constexpr Real kRangeSlack = 1e-9, kSingleRangeSlack = 1e-5;
 
 /// errors = values - reference; whether all values lie in [low, high], which none does that is not finite.
 bool subtract(const Real* values, Real reference, Real low, Real high, std::span<Real> errors) {
-  Lanes value{};
+  Eight value{};
   auto inside = value == value;
   std::size_t i = 0;
-  for (; i + kLanes <= errors.size(); i += kLanes) {
+  for (; i + kEight <= errors.size(); i += kEight) {
     load(values + i, value);
     inside &= (value >= low) & (value <= high);
     store(value - reference, &errors[i]);
   }
   bool all = true;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) all &= inside[lane] != 0;
+  for (std::size_t lane = 0; lane < kEight; ++lane) all &= inside[lane] != 0;
   for (; i < errors.size(); ++i) {
     all &= values[i] >= low && values[i] <= high;
     errors[i] = values[i] - reference;
@@ -197,13 +197,13 @@ bool subtract(const Real* values, Real reference, Real low, Real high, std::span
 }
 
 Real sum_of_squares(std::span<const std::uint32_t> counts) {
-  using Counts [[gnu::vector_size(kLanes * sizeof(std::uint32_t))]] = std::uint32_t;
-  Lanes sum{};
+  using Counts [[gnu::vector_size(kEight * sizeof(std::uint32_t))]] = std::uint32_t;
+  Eight sum{};
   Counts each;
   std::size_t i = 0;
-  for (; i + kLanes <= counts.size(); i += kLanes) {
+  for (; i + kEight <= counts.size(); i += kEight) {
     std::memcpy(&each, &counts[i], sizeof each);
-    const Lanes count = __builtin_convertvector(each, Lanes);
+    const Eight count = __builtin_convertvector(each, Eight);
     sum += count * count;
   }
   Real result = total(sum);
@@ -253,8 +253,9 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   });
   // Fills `errors` of an output, 0 for samples that are not finite, and tells those that count.
   constexpr Real kLargest = std::numeric_limits<Real>::max();
-  const Real low = gate ? std::max(gate->low - kRangeSlack, -kLargest) : -kLargest;
-  const Real high = gate ? std::min(gate->high + kRangeSlack, kLargest) : kLargest;
+  const Real slack = cell.precision == Precision::float64 ? kRangeSlack : kSingleRangeSlack;
+  const Real low = gate ? std::max(gate->low - slack, -kLargest) : -kLargest;
+  const Real high = gate ? std::min(gate->high + slack, kLargest) : kLargest;
   const bool as_drawn = cell.measurement == Measurement{};
   const auto take_errors = [&](Scratch& mine, std::size_t o, Real target, std::span<Real> errors,
                                ChunkResult& out) -> std::span<const Real> {

@@ -246,6 +246,8 @@ Json cell_schema() {
        {"rng_draws_per_sample", nullable("number")},
        {"lookups", described(whole(0), "over all samples")},
        {"rng_draws", described(whole(0), "over all samples")},
+       {"lookups_variance", described(nullable("number"), "of one sample's lookups, averaged over the rays")},
+       {"instructions", described(whole(0), "that drawing all samples took, counted in a simulator")},
        {"majorant_violations", whole(0)},
        {"largest_violation", described(nullable("number"), "extinction over majorant, where above 1")},
        {"nonfinite", whole(0)},

@@ -11,6 +11,13 @@
 #include "harness/verdict_json.h"
 
 namespace nullmark {
+
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) result += c == '|' ? "\\|" : std::string(1, c);
+  return result;
+}
+
 namespace {
 
 /// What a cell amounts to, as one word.
@@ -91,13 +98,6 @@ std::size_t configured_cells(const RunRecord& run) {
 
 std::size_t met(const std::vector<Expectation>& all) {
   return static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [](const Expectation& one) { return one.met; }));
-}
-
-/// For a cell of a markdown table.
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) result += c == '|' ? "\\|" : std::string(1, c);
-  return result;
 }
 
 std::string families(const RunRecord& run) {

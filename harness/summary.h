@@ -24,6 +24,9 @@ struct Summary {
 /// or no cell that passed 77; else 0.
 Summary summarise(RunRecord& run);
 
+/// Text for a cell of a markdown table.
+std::string escaped(const std::string& text);
+
 /// For the terminal: counts, then every cell that did not pass with its reason.
 std::string summary_text(const RunRecord& run, const Summary& summary);
 
