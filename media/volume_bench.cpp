@@ -9,6 +9,7 @@
 
 #include "harness/bench_kernel.h"
 #include "harness/calibration.h"
+#include "harness/names.h"
 #include "media/example_media.h"
 
 namespace nullmark {
@@ -87,6 +88,73 @@ void walk(benchmark::State& state, const Reader& value) {
   count_lookups(state, lookups);
 }
 
+/// Bounds of 16^3 cells over the volume, and the ratio tracker that one would write by hand over them: a 3D-DDA in the loop of
+/// each sample, one exponential carried across cells.
+class BoundedWalk {
+ public:
+  BoundedWalk() {
+    const FilteredVolume<TrilinearFilter> medium(Fixture::instance().data, kExtinction);
+    box_ = medium.bounds();
+    size_ = box_.extent() / kCells;
+    for (int z = 0; z < kCells; ++z)
+      for (int y = 0; y < kCells; ++y)
+        for (int x = 0; x < kCells; ++x) {
+          const Vec3 lo = box_.lo + Vec3(x, y, z).cwiseProduct(size_);
+          bounds_.push_back(medium.extrema({lo, lo + size_}).maximum[0]);
+        }
+  }
+
+  template <class Reader>
+  Real sample(PlainRng& rng, const Ray& ray, const Reader& value, std::uint64_t& lookups) const {
+    int at[3], step[3];
+    Real next[3], apart[3];
+    const Vec3 start = ray.at(ray.begin);
+    for (int k = 0; k < 3; ++k) {
+      at[k] = std::clamp(static_cast<int>((start[k] - box_.lo[k]) / size_[k]), 0, kCells - 1);
+      step[k] = ray.direction[k] > 0 ? 1 : -1;
+      next[k] = (box_.lo[k] + (at[k] + (step[k] > 0)) * size_[k] - ray.origin[k]) / ray.direction[k];
+      apart[k] = size_[k] / std::abs(ray.direction[k]);
+    }
+    Real t = ray.begin, weight = 1, depth = -std::log(1 - rng.uniform());
+    for (;;) {
+      const int axis = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
+      const Real bound = bounds_[static_cast<std::size_t>((at[2] * kCells + at[1]) * kCells + at[0])];
+      const Real end = std::min(next[axis], ray.end);
+      while (depth < bound * (end - t)) {
+        t += depth / bound;
+        ++lookups;
+        weight *= (bound - kExtinction * value(Vec3(ray.at(t)))) / bound;
+        depth = -std::log(1 - rng.uniform());
+      }
+      depth -= bound * (end - t);
+      t = end;
+      at[axis] += step[axis];
+      if (!(t < ray.end) || at[axis] < 0 || at[axis] >= kCells) return weight;
+      next[axis] += apart[axis];
+    }
+  }
+
+ private:
+  static constexpr int kCells = 16;
+  Box box_;
+  Vec3 size_;
+  std::vector<Real> bounds_;
+};
+
+template <class Reader>
+void walk_bounded(benchmark::State& state, const Reader& value) {
+  const BoundedWalk walk;
+  const Ray ray = Fixture::instance().local;
+  PlainRng rng(1);
+  std::uint64_t lookups = 0, samples = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    for (int i = 0; i < 64; ++i) benchmark::DoNotOptimize(walk.sample(rng, ray, value, lookups));
+    samples += 64;
+  }
+  count_items(state, "sample", samples);
+  count_lookups(state, lookups);
+}
+
 [[maybe_unused]] const BenchmarkGroup kGroup([] {
   const std::string group = "ratio tracking, trilinear volume, global majorant/";
   benchmark::RegisterBenchmark((group + "0 NanoVDB ReadAccessor, hand-written").c_str(), [](benchmark::State& state) {
@@ -104,11 +172,22 @@ void walk(benchmark::State& state, const Reader& value) {
     using Sampler = openvdb::tools::BoxSampler;
     walk(state, [&](const Vec3& p) { return static_cast<Real>(Sampler::sample(accessor, openvdb::Vec3d(p.x(), p.y(), p.z()))); });
   });
-  benchmark::RegisterBenchmark((group + "nullmark, ratio").c_str(), [](benchmark::State& state) {
-    const auto medium = std::make_shared<FilteredVolume<TrilinearFilter>>(Fixture::instance().data, kExtinction);
-    run_kernel_bench(state, KernelBench({"ratio", {}, {}, {}}, medium, {"prescribed", {{"value", kExtinction}}, {}, {}},
-                                        Fixture::world_ray()));
+  const std::string bounded = "ratio tracking, trilinear volume, 16^3 bounds/";
+  benchmark::RegisterBenchmark((bounded + "0 dense array, hand-written").c_str(), [](benchmark::State& state) {
+    const Fixture& fixture = Fixture::instance();
+    walk_bounded(state, [&](const Vec3& p) { return fixture.dense_trilinear(p.x(), p.y(), p.z()); });
   });
+  for (const Precision precision : {Precision::float64, Precision::float32}) {
+    const auto run = [precision](const Component& majorant) {
+      return [=](benchmark::State& state) {
+        const auto medium = std::make_shared<FilteredVolume<TrilinearFilter>>(Fixture::instance().data, kExtinction);
+        run_kernel_bench(state, KernelBench({"ratio", {}, {}, {}}, medium, majorant, Fixture::world_ray(), precision));
+      };
+    };
+    const std::string name = "nullmark, ratio, " + to_string(precision);
+    benchmark::RegisterBenchmark((group + name).c_str(), run({"prescribed", {{"value", kExtinction}}, {}, {}}));
+    benchmark::RegisterBenchmark((bounded + name).c_str(), run({"grid", {{"resolution", 16}}, {}, {}}));
+  }
 });
 
 }  // namespace

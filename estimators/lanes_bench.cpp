@@ -1,0 +1,99 @@
+#include <fmt/format.h>
+
+#include "harness/bench_kernel.h"
+#include "harness/calibration.h"
+#include "harness/names.h"
+
+namespace nullmark {
+namespace {
+
+// What lanes give over one walk at a time: ratio and delta tracking on rays of length 1, in double and in float, beside the plain
+// loops, and beside the least that a step in registers can cost.  Inputs of hand-written loops are volatile, see
+// estimators_bench.cpp.
+
+/// Delta tracking as one would write it by hand, see plain_ratio_loop.
+template <class Extinction>
+Real plain_delta_loop(PlainRng& rng, Real majorant, const Extinction& extinction, std::uint64_t& lookups) {
+  const Real inverse = 1 / majorant;
+  Real t = 0;
+  for (;;) {
+    t -= std::log(1 - rng.uniform()) * inverse;
+    if (t >= 1) return 1;
+    ++lookups;
+    if (rng.uniform() * majorant < extinction(t)) return 0;
+  }
+}
+
+void plain(benchmark::State& state, bool ratio, Real majorant, const auto& extinction) {
+  PlainRng rng(1);
+  std::uint64_t lookups = 0, samples = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    for (int i = 0; i < 256; ++i)
+      benchmark::DoNotOptimize(ratio ? plain_ratio_loop(rng, majorant, extinction, lookups)
+                                     : plain_delta_loop(rng, majorant, extinction, lookups));
+    samples += 256;
+  }
+  count_items(state, "sample", samples);
+  count_lookups(state, lookups);
+}
+
+/// Random number, logarithm, advance, and an exponential where asked.
+template <class T, bool with_exponential>
+void lane_floor(benchmark::State& state) {
+  using Pack = Lanes<T, kNativeLanes<T>>;
+  constexpr std::uint64_t kSteps = 4096;
+  auto streams = LaneRng<T, kNativeLanes<T>>::seeded({1, 2, 3});
+  LaneRng<T, kNativeLanes<T>> rng(streams, true);
+  volatile Real rate = 1e-6;
+  const Pack inverse = Real{rate};
+  Pack t = 0, sum = 0;
+  std::uint64_t steps = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    for (std::uint64_t i = 0; i < kSteps; i += kNativeLanes<T>) {
+      t += rng.exponential() * inverse;
+      if constexpr (with_exponential) sum += exponential(-t);
+    }
+    T lanes[kNativeLanes<T>];
+    (t + sum).store(lanes);
+    benchmark::DoNotOptimize(&lanes[0]);
+    benchmark::ClobberMemory();
+    steps += kSteps;
+  }
+  count_items(state, "sample", steps);
+  count_lookups(state, steps);
+}
+
+void add(const std::string& profile, bool ratio, Real lookups, const std::shared_ptr<const Medium>& medium,
+         const auto& extinction) {
+  const std::string name = ratio ? "ratio" : "delta";
+  const std::string group = fmt::format("lanes, {} tracking, {}, majorant depth {}/", name, profile, lookups);
+  const auto in_registry = [=](const std::string& what, auto run) { benchmark::RegisterBenchmark((group + what).c_str(), run); };
+  in_registry("0 hand-written", [=](benchmark::State& state) { plain(state, ratio, lookups, extinction); });
+  for (const Precision precision : {Precision::float64, Precision::float32})
+    in_registry(to_string(precision), [=](benchmark::State& state) {
+      run_kernel_bench(state, KernelBench({name, {}, {}, {}}, medium, {"prescribed", {{"value", lookups}}, {}, {}},
+                                          {{0, 0.5, 0.5}, {1, 0, 0}, 0, 1}, precision));
+    });
+  const bool smooth = profile != "constant";
+  in_registry("least step, double", smooth ? lane_floor<double, true> : lane_floor<double, false>);
+  in_registry("least step, float", smooth ? lane_floor<float, true> : lane_floor<float, false>);
+  in_registry("least step with exponential, float", lane_floor<float, true>);
+}
+
+[[maybe_unused]] const BenchmarkGroup kGroup([] {
+  // Inputs that the compiler must not know.
+  static volatile Real extinction = 0.4, centre = 0.32, sigma = 0.05;
+  for (const bool ratio : {true, false})
+    for (const Real lookups : {5., 30.}) {
+      add("constant", ratio, lookups, make_medium({"homogeneous", {{"extinction", 0.4}}, {}, {}})->build(),
+          [mu = Real{extinction}](Real) { return mu; });
+      add("Gaussian", ratio, lookups, make_medium({"gaussian_bump", {{"amplitude", 4.}}, {}, {}})->build(),
+          [c = Real{centre}, scale = 1 / Real{sigma}](Real t) {
+            const Real s = (t - c) * scale;
+            return 4 * std::exp(-0.5 * s * s);
+          });
+    }
+});
+
+}  // namespace
+}  // namespace nullmark
