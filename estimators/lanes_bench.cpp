@@ -74,9 +74,9 @@ void add(const std::string& profile, bool ratio, Real lookups, const std::shared
       run_kernel_bench(state, KernelBench({name, {}, {}, {}}, medium, {"prescribed", {{"value", lookups}}, {}, {}},
                                           {{0, 0.5, 0.5}, {1, 0, 0}, 0, 1}, precision));
     });
-  const bool smooth = profile != "constant";
-  in_registry("least step, double", smooth ? lane_floor<double, true> : lane_floor<double, false>);
-  in_registry("least step, float", smooth ? lane_floor<float, true> : lane_floor<float, false>);
+  in_registry("least step, double", lane_floor<double, false>);
+  in_registry("least step, float", lane_floor<float, false>);
+  in_registry("least step with exponential, double", lane_floor<double, true>);
   in_registry("least step with exponential, float", lane_floor<float, true>);
 }
 

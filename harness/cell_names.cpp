@@ -16,14 +16,13 @@ namespace nullmark {
 namespace {
 
 /// What may tell cells of an experiment apart beside estimator, medium and majorant.
-std::array<std::string, 8> distinctions(const Plan& plan, const Cell& cell) {
+std::array<std::string, 7> distinctions(const Plan& plan, const Cell& cell) {
   const Measurement& measurement = cell.measurement;
   std::string measured = measurement.clamp ? "clamped" : "unclamped";
   if (measurement.quantise_bits > 0) measured += fmt::format("/quantise_bits:{}", measurement.quantise_bits);
   return {
       fmt::format("seed:{}", cell.seed),
       to_string(cell.quantity),
-      to_string(cell.precision),
       plan.ray_sets[cell.rays].label,
       cell.equal_lookups ? fmt::format("equal_lookups:{}", *cell.equal_lookups) : fmt::format("samples:{}", cell.samples_per_ray),
       measured,
@@ -47,7 +46,7 @@ void add_experiments_where_needed(Plan& plan) {
 }
 
 void add_distinctions(const Plan& plan, const std::vector<Cell*>& cells) {
-  std::vector<std::array<std::string, 8>> words;
+  std::vector<std::array<std::string, 7>> words;
   for (const Cell* cell : cells) words.push_back(distinctions(plan, *cell));
   for (std::size_t i = 0; i < words[0].size(); ++i) {
     if (std::all_of(words.begin(), words.end(), [&](const auto& own) { return own[i] == words[0][i]; })) continue;
@@ -62,6 +61,7 @@ void name_cells(Plan& plan) {
   for (Cell& cell : plan.cells) {
     cell.id = cell_id(plan, cell);
     cell.name = fmt::format("{}/{}/{}", cell.estimator.label, plan.media[cell.medium].label, plan.majorants[cell.majorant].label);
+    if (cell.precision != Precision::float64) cell.name += "/" + to_string(cell.precision);
   }
   add_experiments_where_needed(plan);
   for (const auto& [name, cells] : cells_by_name(plan)) add_distinctions(plan, cells);

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -18,7 +19,8 @@ class Cli : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("nullmark_cli_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+              (std::string("nullmark_cli_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
+               std::to_string(::getpid()));
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
     write("c.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "harness/cell_names.h"
 #include "harness/json_input.h"
 #include "harness/names.h"
 #include "harness/transport_json.h"
@@ -75,7 +76,7 @@ std::string compare_results(const std::vector<RunRecord>& runs, const std::strin
       std::vector<Row>& rows = groups[group_of(record)];
       if (rows.empty()) order.push_back(group_of(record));
       rows.push_back({&record, efficiency(record)});
-      known.insert(known.end(), {record.cell.estimator.label, record.cell.estimator.type});
+      known.insert(known.end(), {tracker_label(record.cell), record.cell.estimator.type});
     }
   if (!baseline.empty() && std::find(known.begin(), known.end(), baseline) == known.end()) {
     const std::string near = nearest(baseline, known);
@@ -89,12 +90,12 @@ std::string compare_results(const std::vector<RunRecord>& runs, const std::strin
     std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return sort_key(a) < sort_key(b); });
     const auto is_base = [&](const Row& row) {
       return baseline.empty() ? row.record->claims == "unbiased"
-                              : row.record->cell.estimator.label == baseline || row.record->cell.estimator.type == baseline;
+                              : tracker_label(row.record->cell) == baseline || row.record->cell.estimator.type == baseline;
     };
     const auto base = std::find_if(rows.begin(), rows.end(), is_base);
     const Efficiency none, &reference = base == rows.end() ? none : base->efficiency;
     std::size_t width = 9;
-    for (const Row& row : rows) width = std::max(width, row.record->cell.estimator.label.size());
+    for (const Row& row : rows) width = std::max(width, tracker_label(row.record->cell).size());
     out += fmt::format("{}\n  {:<{}} {:>10} {:>10} {:>8} {:>10} {:>8} {:>10} {:>8} {:>9}\n", name, "estimator", width, "variance",
                        "var x look", "", "var x ns", "", "s to 1 %", "", "floor");
     for (const Row& row : rows) {
@@ -102,7 +103,7 @@ std::string compare_results(const std::vector<RunRecord>& runs, const std::strin
       const std::string error = e.relative_error > 0 ? fmt::format(" +-{:.1f}%", 196 * e.relative_error) : "";
       const bool floored = e.floor && *e.floor > 0 && row.record->claims != "unbiased" && row.record->claims != "exact";
       out += fmt::format(
-          "  {:<{}} {:>10} {:>10} {:>8} {:>10} {:>8} {:>10} {:>8} {:>9}{}\n", row.record->cell.estimator.label, width,
+          "  {:<{}} {:>10} {:>10} {:>8} {:>10} {:>8} {:>10} {:>8} {:>9}{}\n", tracker_label(row.record->cell), width,
           number(e.variance), number(e.variance_x_lookups), ratio(e.variance_x_lookups, reference.variance_x_lookups),
           number(e.variance_x_ns), ratio(e.variance_x_ns, reference.variance_x_ns),
           e.seconds_to_1pct  ? fmt::format("{:.3g}", *e.seconds_to_1pct)

@@ -93,6 +93,7 @@ Row csv_row(const CellRecord& record, std::size_t c) {
           {"majorant", record.majorant.label},
           {"ray_set", record.ray_set.label},
           {"quantity", to_string(cell.quantity)},
+          {"precision", to_string(cell.precision)},
           {"channel", fmt::to_string(c)},
           {"rays", fmt::to_string(record.rays)},
           {"samples_per_ray", fmt::to_string(cell.samples_per_ray)},

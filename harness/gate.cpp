@@ -17,6 +17,13 @@ constexpr Real kFailRates[] = {0.4, 1.5}, kPassRates[] = {0.5, 0.9};
 /// Catoni's variance bound over the known variance: quadrature slack, and what PASS concedes ("given Var <= 1.25 sigma^2").
 constexpr Real kFailSlack = 1.02, kPassSlack = 1.25, kPilotSlack = 2;
 
+/// What single precision may add to a mean: every factor of a weight is off by a few units in its last place, and all of them
+/// may be so to the same side, and numbers below the least normal one have no digits left.
+Real single_error(const Cell& cell, Real mean, Real lookups) {
+  if (cell.precision == Precision::float64) return 0;
+  return 2 * epsilon_of(cell.precision) * std::abs(mean) * (1 + lookups) + std::numeric_limits<float>::min();
+}
+
 /// Where the standard deviation is a millionth of rounding, no sample in 10^12 shows it, whatever its law [Chebyshev].
 constexpr Real kSurely = 1e-12;
 
@@ -243,7 +250,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
       test.group = static_cast<int>(g) - 1;
       test.rays = pool.rays;
       test.epsilon = g == 0 ? epsilon : epsilon * kGroupMargin;
-      test.reference_error = pool.reference_error / n;
+      test.reference_error = pool.reference_error / n + single_error(cell, pool.mean, mean_lookups);
       test.variance = pool.variance / n;
       const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0;
       test.rounding = 64 * ulp * (1 + mean_lookups + depth) * std::max(std::abs(pool.most), std::abs(pool.least));

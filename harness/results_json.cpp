@@ -70,7 +70,7 @@ Json time_json(const CellRecord& record) {
   return {{"ns_per_sample", real(time.ns_per_sample)},
           {"ns_per_lookup", real(time.ns_per_lookup)},
           {"floor_ratio", real(time.floor_ratio)},
-          {"memory_ratio", real(time.memory_ratio)},
+          {"memory_ratio", time.memory_ratio > 0 ? real(time.memory_ratio) : Json()},
           {"loop_ratio", real(time.loop_ratio)},
           {"repetitions", time.repetitions},
           {"mad", real(time.mad)},
@@ -190,7 +190,7 @@ TimeRecord read_time(const Place& place) {
   time.ns_per_sample = real_or_nan(place, "ns_per_sample");
   time.ns_per_lookup = real_or_nan(place, "ns_per_lookup");
   time.floor_ratio = real_or_nan(place, "floor_ratio");
-  if (place.has("memory_ratio")) time.memory_ratio = real_or_nan(place, "memory_ratio");
+  if (place.has("memory_ratio")) time.memory_ratio = optional_real(place, "memory_ratio").value_or(0);
   time.loop_ratio = real_or_nan(place, "loop_ratio");
   time.mad = real_or_nan(place, "mad");
   time.repetitions = static_cast<int>(place["repetitions"].integer(0, std::numeric_limits<int>::max()));

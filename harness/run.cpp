@@ -129,14 +129,21 @@ class Workshop {
   static std::string why_not(const Cell& cell, const Scene& scene, const Kernel* made) {
     const int channels = scene.medium->medium->channels();
     if (!made)
-      return fmt::format("{} has no form in {} for {} channel{}", cell.estimator.type, to_string(cell.precision), channels,
-                         channels == 1 ? "" : "s");
+      return channels > 1 ? fmt::format("{} channels have no form in float; expected precision \"double\"", channels)
+                          : fmt::format("{} has no form in float; expected precision \"double\"", cell.estimator.type);
     const Kernel& kernel = *made;
     if (!kernel.answers(cell.quantity))
       return fmt::format("{} does not answer {}{}", cell.estimator.type, to_string(cell.quantity),
                          cell.precision == Precision::float32 ? " in float" : "");
-    if (cell.precision == Precision::float32 && deepest_majorant(scene) > kDeepestSingle)
-      return fmt::format("rays of majorant depth {:.3g} leave float no digits for a flight; expected at most {}, or \"double\"",
+    const bool single = cell.precision == Precision::float32;
+    const Box box = scene.medium->medium->bounds();
+    if (single && box.lo.cwiseAbs().cwiseMax(box.hi.cwiseAbs()).maxCoeff() > kFarthestSingle * box.extent().minCoeff())
+      return fmt::format(
+          "the medium lies over {} times its size from the origin of its frame, where float has no digits for a "
+          "position; expected it nearer, or \"double\"",
+          kFarthestSingle);
+    if (single && deepest_majorant(scene) > kDeepestSingle)
+      return fmt::format("rays of majorant depth {:.6g} leave float no digits for a flight; expected at most {}, or \"double\"",
                          deepest_majorant(scene), kDeepestSingle);
     if (kernel.needs_knots() && !scene.medium->medium->polynomial_degree())
       return "no exact traversal: the medium is not polynomial between knots";
@@ -147,6 +154,8 @@ class Workshop {
 
   /// Flights in float are told to 2^-24 of the ray's depth: here still a thousandth of a mean free path.
   static constexpr Real kDeepestSingle = 1 << 14;
+  /// Of a medium from its frame's origin, in its own sizes: its inside is still told to 2^-14.
+  static constexpr Real kFarthestSingle = 1 << 10;
 
   static Real deepest_majorant(const Scene& scene) {
     Real deepest = 0;

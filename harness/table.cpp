@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "harness/cell_names.h"
 #include "harness/expectation.h"
 #include "harness/metrics.h"
 #include "harness/names.h"
@@ -60,7 +61,7 @@ Line channel_line(const CellRecord& record, std::size_t c) {
   const ChannelRecord& channel = record.channel[c];
   const bool first = c == 0;
   const auto once = [&](const std::optional<Real>& number) { return first ? short_number(number) : std::string(); };
-  return {first ? record.cell.estimator.label + (record.outputs.empty() ? "" : ", " + record.outputs[0])
+  return {first ? tracker_label(record.cell) + (record.outputs.empty() ? "" : ", " + record.outputs[0])
                 : "  " + output_name(record, c),
           shown(channel, channel.rmse, channel.rmse_theory),
           short_number(channel.bias),
@@ -80,7 +81,7 @@ void append_lines(const CellRecord& record, std::vector<Line>& lines) {
   for (std::size_t c = 0; c < record.channel.size(); ++c) lines.push_back(channel_line(record, c));
   if (!record.channel.empty()) return;
   Line line(lines[0].size(), "-");
-  line.front() = record.cell.estimator.label;
+  line.front() = tracker_label(record.cell);
   line.back() = to_string(record.status) + (record.reason.empty() ? "" : ": " + record.reason);
   lines.push_back(line);
 }

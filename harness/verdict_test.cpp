@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -485,7 +486,8 @@ class Check : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("nullmark_check_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+              (std::string("nullmark_check_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
+               std::to_string(::getpid()));
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
     // All kinds of tests: channels, groups of rays, lookups, cells without variance.
