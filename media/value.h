@@ -1,5 +1,6 @@
 #pragma once
 
+#include <concepts>
 #include <vector>
 
 #include "media/elementary.h"
@@ -78,9 +79,9 @@ inline Spectrum larger(const Spectrum& x, Real least) { return x.max(least); }
 
 inline bool none(bool x) { return !x; }
 
-template <class Value>
-const Value& entry(const std::vector<Value>& table, std::size_t i) {
-  return table[i];
+template <class Value, std::integral Index>
+const Value& entry(const std::vector<Value>& table, Index i) {
+  return table[static_cast<std::size_t>(i)];
 }
 
 /// Whether every channel is 0.
