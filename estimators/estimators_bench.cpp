@@ -9,31 +9,23 @@ namespace {
 // Every registered estimator along rays of length 1 whose majorant is the number of lookups that a ratio tracker takes.  Inputs
 // of hand-written loops are volatile: Google Benchmark 1.7's DoNotOptimize of a double that is written corrupts it under GCC.
 
-template <class Extinction>
-void plain_loop(benchmark::State& state, Real majorant, const Extinction& extinction) {
-  PlainRng rng(1);
-  std::uint64_t lookups = 0, samples = 0;
-  for ([[maybe_unused]] auto _ : state) {
-    for (int i = 0; i < 256; ++i) benchmark::DoNotOptimize(plain_ratio_loop(rng, majorant, extinction, lookups));
-    samples += 256;
-  }
-  count_items(state, "sample", samples);
-  count_lookups(state, lookups);
-}
-
 void plain_constant(benchmark::State& state, Real majorant) {
   volatile Real half = majorant / 2;
   const Real mu = half;
-  plain_loop(state, majorant, [&](Real) { return mu; });
+  const auto extinction = [&](Real) { return mu; };
+  run_plain_bench(state,
+                  [&](PlainRng& rng, std::uint64_t& lookups) { return plain_ratio_loop(rng, majorant, extinction, lookups); });
 }
 
 void plain_gaussian(benchmark::State& state, Real majorant) {
   volatile Real height = majorant, middle = 0.32, sigma = 0.05;
   const Real amplitude = height, centre = middle, scale = 1 / sigma;
-  plain_loop(state, majorant, [&](Real t) {
+  const auto extinction = [&](Real t) {
     const Real s = (t - centre) * scale;
     return amplitude * std::exp(-0.5 * s * s);
-  });
+  };
+  run_plain_bench(state,
+                  [&](PlainRng& rng, std::uint64_t& lookups) { return plain_ratio_loop(rng, majorant, extinction, lookups); });
 }
 
 void floor(benchmark::State& state) {

@@ -25,38 +25,22 @@ Real plain_delta_loop(PlainRng& rng, Real majorant, const Extinction& extinction
 }
 
 void plain(benchmark::State& state, bool ratio, Real majorant, const auto& extinction) {
-  PlainRng rng(1);
-  std::uint64_t lookups = 0, samples = 0;
-  for ([[maybe_unused]] auto _ : state) {
-    for (int i = 0; i < 256; ++i)
-      benchmark::DoNotOptimize(ratio ? plain_ratio_loop(rng, majorant, extinction, lookups)
-                                     : plain_delta_loop(rng, majorant, extinction, lookups));
-    samples += 256;
-  }
-  count_items(state, "sample", samples);
-  count_lookups(state, lookups);
+  if (ratio)
+    run_plain_bench(state,
+                    [&](PlainRng& rng, std::uint64_t& lookups) { return plain_ratio_loop(rng, majorant, extinction, lookups); });
+  else
+    run_plain_bench(state,
+                    [&](PlainRng& rng, std::uint64_t& lookups) { return plain_delta_loop(rng, majorant, extinction, lookups); });
 }
 
-/// Random number, logarithm, advance, and an exponential where asked.
 template <class T, bool with_exponential>
 void lane_floor(benchmark::State& state) {
-  using Pack = Lanes<T, kNativeLanes<T>>;
   constexpr std::uint64_t kSteps = 4096;
   auto streams = LaneRng<T, kNativeLanes<T>>::seeded({1, 2, 3});
-  LaneRng<T, kNativeLanes<T>> rng(streams, true);
-  volatile Real rate = 1e-6;
-  const Pack inverse = Real{rate};
-  Pack t = 0, sum = 0;
+  volatile Real rate = 1e-3;
   std::uint64_t steps = 0;
   for ([[maybe_unused]] auto _ : state) {
-    for (std::uint64_t i = 0; i < kSteps; i += kNativeLanes<T>) {
-      t += rng.exponential() * inverse;
-      if constexpr (with_exponential) sum += exponential(-t);
-    }
-    T lanes[kNativeLanes<T>];
-    (t + sum).store(lanes);
-    benchmark::DoNotOptimize(&lanes[0]);
-    benchmark::ClobberMemory();
+    benchmark::DoNotOptimize(lane_floor_loop<T, with_exponential>(streams, rate, kSteps));
     steps += kSteps;
   }
   count_items(state, "sample", steps);

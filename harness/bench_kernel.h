@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "harness/bench.h"
+#include "harness/calibration.h"
 #include "harness/parameter_values.h"
 #include "harness/scene.h"
 
@@ -59,6 +60,19 @@ inline void run_kernel_bench(benchmark::State& state, KernelBench bench) {
   for ([[maybe_unused]] auto _ : state) bench.draw();
   count_items(state, "sample", bench.counters().samples);
   count_lookups(state, bench.counters().lookups);
+}
+
+/// Times a hand-written sampler, `Real sample(PlainRng&, std::uint64_t& lookups)`; items are samples.
+template <class Sample>
+void run_plain_bench(benchmark::State& state, const Sample& sample) {
+  PlainRng rng(1);
+  std::uint64_t lookups = 0, samples = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    for (int i = 0; i < 256; ++i) benchmark::DoNotOptimize(sample(rng, lookups));
+    samples += 256;
+  }
+  count_items(state, "sample", samples);
+  count_lookups(state, lookups);
 }
 
 }  // namespace nullmark

@@ -44,16 +44,19 @@ inline Real floor_loop(PlainRng& rng, Real inverse_rate, std::uint64_t steps) {
   return t;
 }
 
-/// The same in registers of this build's width: the least that `steps` tentative
-/// collisions, a multiple of the lanes, can cost.
-template <class T>
+/// The same in registers of this build's width, with an exponential where asked: the least that `steps` tentative collisions, a
+/// multiple of the lanes, can cost.
+template <class T, bool with_exponential = false>
 Real lane_floor_loop(typename LaneRng<T, kNativeLanes<T>>::State& streams, Real inverse_rate, std::uint64_t steps) {
   using Pack = Lanes<T, kNativeLanes<T>>;
   LaneRng<T, kNativeLanes<T>> rng(streams, true);
-  Pack t = 0;
-  for (std::uint64_t i = 0; i < steps; i += kNativeLanes<T>) t += rng.exponential() * Pack(inverse_rate);
+  Pack t = 0, sum = 0;
+  for (std::uint64_t i = 0; i < steps; i += kNativeLanes<T>) {
+    t += rng.exponential() * Pack(inverse_rate);
+    if constexpr (with_exponential) sum += exponential(-t);
+  }
   T lanes[kNativeLanes<T>];
-  t.store(lanes);
+  (t + sum).store(lanes);
   return lanes[0];
 }
 

@@ -1,48 +1,20 @@
-#include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-
 #include "harness/exit_code.h"
-#include "harness/file_io.h"
 #include "harness/journal.h"
-#include "harness/results_json.h"
+#include "harness/program_test.h"
 
 namespace nullmark {
 namespace {
 
-/// The program itself, in a folder of its own.
-class Cli : public ::testing::Test {
+class Cli : public ProgramTest {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("nullmark_cli_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
-               std::to_string(::getpid()));
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
+    ProgramTest::SetUp();
     write("c.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
       {"name":"e","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":50,
        "matrix":{"estimator":["ratio","delta","residual_ratio"],"medium":["linear",{"type":"linear","end":2}]}}]})");
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
-  std::string read(const std::string& name) const { return read_file((folder_ / name).string()); }
-  RunRecord results(const std::string& name) const { return read_results(read(name), name); }
-
-  /// Exit code; output goes to the files "out" and "err".
-  int run(const std::string& arguments, const std::string& input = "/dev/null") const {
-    const std::string command = "cd '" + folder_.string() + "' && '" NULLMARK_PROGRAM "' " + arguments + " >out 2>err <" + input;
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  }
 
   static int code(ExitCode exit) { return static_cast<int>(exit); }
-
-  std::filesystem::path folder_;
 };
 
 TEST_F(Cli, RunWritesResultsAndRefusesToReplaceThem) {
@@ -56,7 +28,7 @@ TEST_F(Cli, RunWritesResultsAndRefusesToReplaceThem) {
 }
 
 TEST_F(Cli, StandardOutputCarriesOnlyTheResults) {
-  EXPECT_EQ(run("run - -o -", "c.json"), 0) << read("err");
+  EXPECT_EQ(run("run - -o -", NULLMARK_PROGRAM, "c.json"), 0) << read("err");
   EXPECT_EQ(read_results(read("out"), "out").cells.size(), 6u);
 }
 

@@ -27,10 +27,6 @@ template <std::size_t n, class Aggregate, class Visit>
   }
 }
 
-/// Extinction that exceeds its bound by less is rounding, of the look-up or of the bound: see exceeds().
-template <class T>
-inline constexpr double kBoundRounding = std::is_same_v<T, Real> ? 1e-9 : 1e-6;
-
 /// The loop of BlockKernel with N walks to a register: the same estimator source over Lanes, the same steps, and in double the
 /// same samples bit for bit.  All walks of a block have taken the same number of steps, so a block is lookups done for all;
 /// walks that end leave it, and the others close ranks.  An estimator takes part by `static constexpr bool kLanes = true`, with a

@@ -246,16 +246,6 @@ PerformanceReport compare_counts(const Counts& before, const Counts& after, std:
     if (earlier.count(cell.name) > 0)
       comparison.add_not_compared(cell.name, Tier::counts, "counts", "only on the old side; cells are matched by name");
   report.rows = std::move(comparison.rows);
-  // Cells that silently vanish from a comparison would keep it green.
-  std::map<std::string, std::pair<std::size_t, std::string>> reasons;
-  for (const GateRow& row : report.rows) {
-    if (row.finding != Finding::not_compared) continue;
-    auto& [count, example] = reasons[fmt::format("tier {}, {}", static_cast<int>(row.tier), row.note)];
-    if (++count == 1) example = row.cell;
-  }
-  for (const auto& [reason, seen] : reasons)
-    report.notes.push_back(
-        fmt::format("not compared ({}): {} cell{}, for example {}", reason, seen.first, seen.first == 1 ? "" : "s", seen.second));
   return report;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "harness/junit.h"
 #include "harness/summary.h"
@@ -77,6 +78,22 @@ std::vector<std::string> totals(const PerformanceReport& report) {
   return lines;
 }
 
+/// Why comparisons were not made, how many and an example, one line for each reason: cells that silently vanish would keep a
+/// comparison green.
+std::vector<std::string> left_out(const PerformanceReport& report) {
+  std::map<std::string, std::pair<std::size_t, std::string>> reasons;
+  for (const GateRow& row : report.rows) {
+    if (row.finding != Finding::not_compared) continue;
+    auto& [count, example] = reasons[fmt::format("tier {}, {}", static_cast<int>(row.tier), row.note)];
+    if (++count == 1) example = row.cell;
+  }
+  std::vector<std::string> lines;
+  for (const auto& [reason, seen] : reasons)
+    lines.push_back(
+        fmt::format("not compared ({}): {} cell{}, for example {}", reason, seen.first, seen.first == 1 ? "" : "s", seen.second));
+  return lines;
+}
+
 std::string conclusion(const PerformanceReport& report) {
   if (const std::size_t regressions = report.count(Finding::regression); regressions > 0)
     return fmt::format("{} performance regressions proven", regressions);
@@ -104,6 +121,7 @@ std::string performance_text(const PerformanceReport& report) {
   if (lines.size() > 1) text += aligned(lines, 3);
   for (const std::string& line : totals(report)) text += line + "\n";
   for (const std::string& note : report.notes) text += note + "\n";
+  for (const std::string& line : left_out(report)) text += line + "\n";
   if (const std::string line = remedy(report); !line.empty()) text += line + "\n";
   return text + conclusion(report) + "\n";
 }
@@ -113,6 +131,7 @@ std::string performance_markdown(const PerformanceReport& report) {
                                  conclusion(report));
   for (const std::string& line : totals(report)) text += fmt::format("- {}\n", line);
   for (const std::string& note : report.notes) text += fmt::format("- {}\n", note);
+  for (const std::string& line : left_out(report)) text += fmt::format("- {}\n", line);
   if (const std::string line = remedy(report); !line.empty()) text += fmt::format("- {}\n", line);
   const auto table = [&](const std::vector<const GateRow*>& rows) {
     std::string result;

@@ -126,7 +126,7 @@ class Workshop {
                                                                : SampleRange::non_negative;
   }
 
-  static std::string why_not(const Cell& cell, const Scene& scene, const Kernel* made) {
+  std::string why_not(const Cell& cell, const Scene& scene, const Kernel* made) {
     const int channels = scene.medium->medium->channels();
     if (!made)
       return channels > 1 ? fmt::format("{} channels have no form in float; expected precision \"double\"", channels)
@@ -142,9 +142,9 @@ class Workshop {
           "the medium lies over {} times its size from the origin of its frame, where float has no digits for a "
           "position; expected it nearer, or \"double\"",
           kFarthestSingle);
-    if (single && deepest_majorant(scene) > kDeepestSingle)
+    if (const Real depth = single ? deepest_majorant(scene) : 0; depth > kDeepestSingle)
       return fmt::format("rays of majorant depth {:.6g} leave float no digits for a flight; expected at most {}, or \"double\"",
-                         deepest_majorant(scene), kDeepestSingle);
+                         depth, kDeepestSingle);
     if (kernel.needs_knots() && !scene.medium->medium->polynomial_degree())
       return "no exact traversal: the medium is not polynomial between knots";
     if (kernel.needs_optical_depth() && scene.reference->method != "closed_form")
@@ -157,15 +157,17 @@ class Workshop {
   /// Of a medium from its frame's origin, in its own sizes: its inside is still told to 2^-14.
   static constexpr Real kFarthestSingle = 1 << 10;
 
-  static Real deepest_majorant(const Scene& scene) {
-    Real deepest = 0;
+  Real deepest_majorant(const Scene& scene) {
+    const auto [known, fresh] = deepest_.try_emplace(&scene, 0);
+    if (!fresh) return known->second;
+    Real& deepest = known->second;
     SegmentBuffer buffer;
+    Rates rates;
     for (std::size_t ray = 0; ray < scene.rays->world.size(); ++ray) {
       scene.majorant->structure->segments(scene.rays->world[ray], scene.rays->local[ray], buffer);
-      Real depth = 0;
-      for (const Segment& segment : buffer.segments)
-        depth += segment.majorant > 0 ? segment.majorant * (segment.end - segment.begin) : 0;
-      deepest = std::max(deepest, depth);
+      rates.start(scene.rays->world[ray].begin);
+      for (const Segment& segment : buffer.segments) rates.append(segment.end, segment.majorant);
+      deepest = std::max(deepest, rates.total_depth());
     }
     return deepest;
   }
@@ -221,6 +223,7 @@ class Workshop {
   std::map<std::array<std::size_t, 3>, std::shared_ptr<const Reference>> references_;
   std::map<std::array<std::size_t, 4>, std::shared_ptr<const Marks>> marks_;
   std::map<std::array<std::size_t, 5>, std::shared_ptr<const Scene>> scenes_;
+  std::map<const Scene*, Real> deepest_;  ///< majorant depth of a ray, where it was asked for
 };
 
 /// Theory of all runnable cells, scene by scene; a measurement stage changes the law of the samples, so those cells have none.

@@ -28,6 +28,32 @@ std::vector<CellRecord> run(const Plan& plan, int threads, const RunObserver& ob
   return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, observer);
 }
 
+/// Single precision is skipped where it has no digits for a position or a flight, and what it adds to a mean is no bias.
+TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
+  const auto only_record = [](const std::string& matrix) {
+    const Plan cells = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e",
+        "rays":{"type":"single"},"samples_per_ray":20000,"matrix":{"estimator":"ratio","precision":"float",)" +
+                                       matrix + "}}]}",
+                                   "test.json");
+    return run(cells, 1, {}).at(0);
+  };
+  const auto refused = [&](const std::string& matrix, const std::string& why) {
+    const CellRecord record = only_record(matrix);
+    EXPECT_EQ(record.status, Status::skipped) << matrix;
+    EXPECT_NE(record.reason.find(why), std::string::npos) << record.reason;
+    EXPECT_NE(record.reason.find("\"double\""), std::string::npos) << record.reason;
+  };
+  refused(R"("medium":{"type":"checkerboard","lo":[2000,0,0],"hi":[2001,1,1]})", "from the origin of its frame");
+  refused(R"("medium":"linear","majorant":{"type":"prescribed","value":16385})", "majorant depth 16385");
+  EXPECT_EQ(only_record(R"("medium":{"type":"checkerboard","lo":[1000,0,0],"hi":[1001,1,1]})").status, Status::ok);
+  // Every one of 10 000 factors of a weight rounds to the same side, by a share of the mean that sampling does show.
+  const CellRecord loose =
+      only_record(R"("medium":{"type":"homogeneous","extinction":1},"majorant":{"type":"global","looseness":10000})");
+  ASSERT_TRUE(loose.verdict);
+  EXPECT_NE(loose.verdict->unbiased, Outcome::fail);
+  EXPECT_GT(loose.verdict->tests.at(0).reference_error, 1e-4);
+}
+
 TEST(Run, TellsOfEveryCellOnceAndOneAtATime) {
   const Plan cells = plan();
   for (const int threads : {1, 4}) {

@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,6 +16,7 @@
 #include "harness/file_io.h"
 #include "harness/junit.h"
 #include "harness/order.h"
+#include "harness/program_test.h"
 #include "harness/record_examples.h"
 #include "harness/results_json.h"
 #include "harness/summary.h"
@@ -481,15 +480,10 @@ TEST(Order, SeriesDifferInNothingButTheirSteps) {
   EXPECT_TRUE(fit_orders(cells).empty());
 }
 
-/// The program itself, in a folder of its own.
-class Check : public ::testing::Test {
+class Check : public ProgramTest {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("nullmark_check_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
-               std::to_string(::getpid()));
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
+    ProgramTest::SetUp();
     // All kinds of tests: channels, groups of rays, lookups, cells without variance.
     write("c.json", config(R"("rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":2000,
         "gate":{"epsilon":0.1,"max_samples_per_ray":16000},
@@ -497,24 +491,11 @@ class Check : public ::testing::Test {
                   "medium":["linear",{"type":"homogeneous","extinction":0.5,"spectrum":[1,2,4]}],
                   "majorant":[{"type":"global","looseness":1.5}]})"));
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   static std::string config(const std::string& experiment) {
     return fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e",{}}}]}})",
                        experiment);
   }
-
-  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
-  std::string read(const std::string& name) const { return read_file((folder_ / name).string()); }
-  RunRecord results(const std::string& name) const { return read_results(read(name), name); }
-
-  int run(const std::string& arguments, const char* program = NULLMARK_PROGRAM) const {
-    const std::string command = fmt::format("cd '{}' && '{}' {} >out 2>err </dev/null", folder_.string(), program, arguments);
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  }
-
-  std::filesystem::path folder_;
 };
 
 TEST_F(Check, PassesWhatPassed) {

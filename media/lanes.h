@@ -53,7 +53,6 @@ class Lanes {
 
   friend Lanes smaller(Lanes a, Lanes b) { return hn::Min(a.vector_, b.vector_); }
   friend Lanes larger(Lanes a, Lanes b) { return hn::Max(a.vector_, b.vector_); }
-  friend Lanes magnitude(Lanes a) { return hn::Abs(a.vector_); }
   friend Lanes rounded_down(Lanes a) { return hn::Floor(a.vector_); }
   /// At most 1 ulp off.
   friend Lanes exponential(Lanes a) { return hn::Exp(Tag(), a.vector_); }

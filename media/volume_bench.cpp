@@ -75,17 +75,10 @@ struct Fixture {
 template <class Reader>
 void walk(benchmark::State& state, const Reader& value) {
   const Ray ray = Fixture::instance().local;
-  PlainRng rng(1);
-  std::uint64_t lookups = 0, samples = 0;
   const Real length = ray.length(), majorant = kExtinction * length;
-  for ([[maybe_unused]] auto _ : state) {
-    for (int i = 0; i < 64; ++i)
-      benchmark::DoNotOptimize(plain_ratio_loop(
-          rng, majorant, [&](Real s) { return majorant * value(Vec3(ray.at(ray.begin + s * length))); }, lookups));
-    samples += 64;
-  }
-  count_items(state, "sample", samples);
-  count_lookups(state, lookups);
+  const auto extinction = [&](Real s) { return majorant * value(Vec3(ray.at(ray.begin + s * length))); };
+  run_plain_bench(state,
+                  [&](PlainRng& rng, std::uint64_t& lookups) { return plain_ratio_loop(rng, majorant, extinction, lookups); });
 }
 
 /// Bounds of 16^3 cells over the volume, and the ratio tracker that one would write by hand over them: a 3D-DDA in the loop of
@@ -145,14 +138,7 @@ template <class Reader>
 void walk_bounded(benchmark::State& state, const Reader& value) {
   const BoundedWalk walk;
   const Ray ray = Fixture::instance().local;
-  PlainRng rng(1);
-  std::uint64_t lookups = 0, samples = 0;
-  for ([[maybe_unused]] auto _ : state) {
-    for (int i = 0; i < 64; ++i) benchmark::DoNotOptimize(walk.sample(rng, ray, value, lookups));
-    samples += 64;
-  }
-  count_items(state, "sample", samples);
-  count_lookups(state, lookups);
+  run_plain_bench(state, [&](PlainRng& rng, std::uint64_t& lookups) { return walk.sample(rng, ray, value, lookups); });
 }
 
 [[maybe_unused]] const BenchmarkGroup kGroup([] {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "media/medium.h"
@@ -22,11 +23,12 @@ struct Segment {
   Real diagonal = 0;   ///< of the structure's cell, world length (for the gamma rule of residual tracking)
 };
 
+/// Extinction above its bound by less, relatively, is rounding of either, where lookups are numbers of type T.
+template <class T>
+inline constexpr Real kBoundRounding = std::is_same_v<T, Real> ? 1e-9 : 1e-6;
+
 /// Whether an extinction is above its bound, beyond the rounding of either.
-inline bool exceeds(Real extinction, Real bound) {
-  constexpr Real kRounding = 1e-9;
-  return extinction > bound * (1 + kRounding);
-}
+inline bool exceeds(Real extinction, Real bound) { return extinction > bound * (1 + kBoundRounding<Real>); }
 
 /// What a majorant structure makes of a ray: contiguous segments from ray.begin to ray.end.
 struct SegmentBuffer {
