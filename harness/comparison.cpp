@@ -68,7 +68,9 @@ void tell_apart(std::vector<Contender>& contenders, const std::vector<RunRecord>
 /// Reachable in a known time.
 bool has_time(const Contender& contender) { return contender.seconds[0] && std::isfinite(contender.seconds[0]->value); }
 
-bool claims_unbiased(const Contender& contender) { return contender.record->claims == "unbiased"; }
+bool claims_unbiased(const Contender& contender) {
+  return contender.record->claims == "unbiased" && contender.record->cell.measurement == Measurement{};
+}
 
 void rank(std::vector<Contender>& contenders) {
   const auto key = [](const Contender& contender) { return has_time(contender) ? contender.seconds[0]->value : kInfinity; };
@@ -183,7 +185,11 @@ std::vector<Contest> contests(const std::vector<RunRecord>& runs, const std::str
       Contest contest = empty_contest(record);
       const auto [place, fresh] = places.try_emplace(contest.name, all.size());
       if (fresh) all.push_back(std::move(contest));
-      Contender contender{run, &record, tracker_label(record.cell), cost_of(record), {}};
+      Contender contender;
+      contender.run = run;
+      contender.record = &record;
+      contender.label = tracker_label(record.cell);
+      contender.cost = cost_of(record);
       for (const Real target : kTargets)
         contender.seconds.push_back(contender.cost ? seconds_to(*contender.cost, target) : std::nullopt);
       known.insert(known.end(), {contender.label, record.cell.estimator.type});

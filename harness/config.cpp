@@ -533,7 +533,7 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
     for (const Place& entry : top["tables"].elements()) plan.tables.push_back(read_table(entry, plan.cells, experiments));
   if (top.has("credits")) {
     top["credits"].expect_object();
-    for (const auto& [name, json] : top["credits"].json().items()) plan.credits[name] = top["credits"][name].string();
+    for (const auto& [name, text] : top["credits"].json().items()) plan.credits[name] = top["credits"][name].string();
   }
   return plan;
 }

@@ -47,7 +47,9 @@ std::optional<Cost> cost_of(const CellRecord& record) {
   if (record.lookups_per_sample) cost.variance_x_lookups = product(cost.variance, exactly(*record.lookups_per_sample));
   if (record.time) cost.ns_per_sample = median_interval(record.time->repetition_ns);
   if (cost.ns_per_sample) cost.variance_x_ns = product(cost.variance, *cost.ns_per_sample);
-  if ((record.claims == "consistent" || record.claims == "biased") && errors_known)
+  // Samples that are clamped or rounded are biased whatever their tracker is.
+  const bool claims_unbiased = record.claims == "unbiased" || record.claims == "exact";
+  if ((!claims_unbiased || !(record.cell.measurement == Measurement{})) && errors_known)
     cost.floor = floor_of(record, mean_square_error / channels, cost.variance.value, cost.reference);
   return cost;
 }

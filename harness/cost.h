@@ -15,7 +15,8 @@ struct Cost {
   Interval variance;                      ///< V, of a sample; a sample variance's interval is by its kurtosis
   std::optional<Interval> ns_per_sample;  ///< median over the repetitions
   std::optional<Interval> variance_x_lookups, variance_x_ns;
-  /// Relative error that no number of samples removes, of estimators that do not claim to be unbiased; from the rays' errors.
+  /// Relative error that no number of samples removes, of estimators that do not claim to be unbiased, and of samples that are
+  /// clamped or rounded; from the rays' errors.
   std::optional<Interval> floor;
 };
 

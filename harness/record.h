@@ -46,10 +46,10 @@ struct TimeRecord {
   Real mad = 0;          ///< median absolute deviation of ns_per_sample
   int repetitions = 0, threads = 1;
   std::uint64_t samples_per_traversal = 1;
-  std::vector<Real> repetition_ns;  ///< ns per sample of each repetition
-  Real majorant_build_seconds = 0;  ///< wall time of building the majorant structure, on all threads
-  std::vector<BatchTime> batches;   ///< ascending; the last is that of ns_per_sample; empty where it is the only one
-  Real memory_ratio = 0;            ///< of volumes: ns per lookup over one read of a random cache line of as many bytes; else 0
+  std::vector<Real> repetition_ns;   ///< ns per sample of each repetition
+  Real majorant_build_seconds = 0;   ///< wall time of building the majorant structure, on all threads
+  std::vector<BatchTime> batches{};  ///< ascending; the last is that of ns_per_sample; empty where it is the only one
+  Real memory_ratio = 0;             ///< of volumes: ns per lookup over one read of a random cache line of as many bytes; else 0
 };
 
 /// PASS: |bias| < epsilon is proven.  FAIL: bias is proven.  INCONCLUSIVE: neither, with the reason.  VIOLATED: the estimator

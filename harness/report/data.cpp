@@ -90,16 +90,16 @@ Json cost_json(const Contender& contender) {
           {"pareto", contender.pareto}};
 }
 
-/// Nanoseconds of one of `samples` samples that share a traversal, and whether just so many were timed.
-std::pair<std::optional<Interval>, bool> sample_time(const CellRecord& record, std::uint64_t samples) {
-  if (!record.time) return {std::nullopt, false};
+/// Nanoseconds of one of `samples` samples that share a traversal; nothing where fewer were timed together than that, or others.
+std::optional<Interval> sample_time(const CellRecord& record, std::uint64_t samples) {
+  if (!record.time) return std::nullopt;
   const TimeRecord& time = *record.time;
+  if (samples >= time.samples_per_traversal) return median_interval(time.repetition_ns);
   for (const BatchTime& batch : time.batches)
-    if (batch.samples_per_traversal == samples && samples != time.samples_per_traversal)
+    if (batch.samples_per_traversal == samples)
       // Median absolute deviation to standard error of a median, for normal scatter.
-      return {relative(batch.ns_per_sample, 1.4826 * 1.2533 * batch.mad / batch.ns_per_sample / std::sqrt(time.repetitions)),
-              true};
-  return {median_interval(time.repetition_ns), samples >= time.samples_per_traversal};
+      return relative(batch.ns_per_sample, 1.4826 * 1.2533 * batch.mad / batch.ns_per_sample / std::sqrt(time.repetitions));
+  return std::nullopt;
 }
 
 /// Error and variance of means of 1, 2, 4, ... samples as measured, relative to the reference's root mean square; a mean square
@@ -122,11 +122,10 @@ Json convergence_json(const CellRecord& record, const std::optional<Cost>& cost)
     const auto n = static_cast<Real>(step.samples);
     const Real groups = static_cast<Real>(record.rays) * std::floor(static_cast<Real>(record.cell.samples_per_ray) / n);
     const Real scatter = groups > 0 ? std::sqrt(std::max<Real>(0, 2 + excess / n) / groups) : kInfinity;
-    const auto [ns, measured] = sample_time(record, step.samples);
+    const std::optional<Interval> ns = sample_time(record, step.samples);
     list.push_back({{"samples", step.samples},
                     {"lookups", number(record.lookups_per_sample ? std::optional(n * *record.lookups_per_sample) : std::nullopt)},
                     {"seconds", ns ? interval(product(*ns, exactly(n * 1e-9))) : Json(nullptr)},
-                    {"time_measured", measured},
                     {"rmse", interval(relative(std::sqrt(square) / cost->reference, scatter / 2))},
                     {"variance", interval(relative(variance, scatter))}});
   }

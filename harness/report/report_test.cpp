@@ -1,0 +1,161 @@
+#include <gtest/gtest.h>
+
+#include <boost/archive/iterators/binary_from_base64.hpp>
+#include <boost/archive/iterators/transform_width.hpp>
+#include <cmath>
+#include <filesystem>
+
+#include "harness/image.h"
+#include "harness/program_test.h"
+#include "harness/record_examples.h"
+#include "harness/report/data.h"
+#include "harness/report/page.h"
+
+namespace nullmark {
+namespace {
+
+Json data_of(const RunRecord& run) { return report_data({run}, {"example.json"}, "", "nullmark report example.json").json; }
+
+TEST(Report, ShowsTheNumbersOfTheResults) {
+  const RunRecord run = example_results();
+  const Json data = data_of(run);
+  ASSERT_EQ(data["cells"].size(), run.cells.size());
+  for (std::size_t i = 0; i < run.cells.size(); ++i) {
+    const CellRecord& record = run.cells[i];
+    const Json& cell = data["cells"][i];
+    EXPECT_EQ(cell["id"], record.cell.id);
+    ASSERT_EQ(cell["mean"].size(), record.channel.size());
+    ASSERT_EQ(cell["outputs"].size(), record.channel.size());
+    for (std::size_t c = 0; c < record.channel.size(); ++c) {
+      EXPECT_EQ(cell["mean"][c].get<Real>(), *record.channel[c].mean);
+      EXPECT_EQ(cell["variance_theory"][c].get<Real>(), *record.channel[c].variance_theory);
+    }
+    EXPECT_EQ(cell["lookups"].get<Real>(), *record.lookups_per_sample);
+    const Json& scene = data["scenes"][cell["scene"].get<std::size_t>()];
+    EXPECT_EQ(scene["medium"], record.medium.label);
+    const auto in_ranking = [&](const Json& row) { return row["cell"] == i; };
+    EXPECT_EQ(std::count_if(scene["ranking"].begin(), scene["ranking"].end(), in_ranking), 1);
+  }
+  ASSERT_EQ(data["tables"].size(), 1u);
+  EXPECT_EQ(data["tables"][0]["columns"], (std::vector<std::string>{"paper", "here", "theory"}));
+  const Json& row = data["tables"][0]["rows"][0];
+  EXPECT_EQ(row["values"][0], 0.1);
+  EXPECT_EQ(row["values"][1].get<Real>(), *run.cells[0].channel[0].rmse);
+  EXPECT_EQ(row["cells"][1], 0);
+}
+
+TEST(Report, TellsOfCellsThatDidNotRun) {
+  RunRecord run = example_results();
+  run.cells[1] = unsampled(run.cells[1], Status::skipped, "no data");
+  const Json data = data_of(run);
+  EXPECT_EQ(data["cells"][1]["status"], "skipped");
+  EXPECT_EQ(data["cells"][1]["reason"], "no data");
+  EXPECT_TRUE(data["cells"][1]["scene"].is_null());
+  EXPECT_EQ(data["runs"][0]["verdicts"]["not_run"], 1);
+}
+
+TEST(Report, NothingIsNeverWrittenAsANumber) {
+  RunRecord run = example_results();
+  run.cells[0].channel[0].mean = std::numeric_limits<Real>::quiet_NaN();
+  run.cells[0].time->repetition_ns.clear();
+  const Json data = data_of(run);
+  EXPECT_TRUE(data["cells"][0]["mean"][0].is_null());
+  EXPECT_TRUE(data["cells"][0]["time"]["ns_per_sample"].is_null());
+}
+
+TEST(Report, ThePageNeedsNothingBesideItAndNoNameBreaksOut) {
+  RunRecord run = example_results();
+  run.name = "</title></script><script>alert(1)</script>";
+  run.cells[0].reason = "</script><img src=x onerror=alert(1)>";
+  const std::string page = report_page(data_of(run));
+  EXPECT_EQ(page.find("alert(1)</script>"), std::string::npos);
+  EXPECT_EQ(page.find("<img src=x"), std::string::npos);
+  for (const char* place : {"{{title}}", "{{css}}", "{{plotly}}", "{{script}}", "{{data}}"})
+    EXPECT_EQ(page.find(place), std::string::npos) << place;
+  for (const char* outside : {"<script src", "<link", "@import", "<img src=\"http"})
+    EXPECT_EQ(page.find(outside), std::string::npos);
+  // The data come back as they went in.
+  const std::string_view open = "<script type=\"application/json\" id=\"data\">";
+  const std::size_t begin = page.find(open) + open.size(), end = page.find("</script>", begin);
+  EXPECT_EQ(Json::parse(page.substr(begin, end - begin))["runs"][0]["name"], run.name);
+}
+
+std::vector<std::uint16_t> numbers_of(const std::string& base64) {
+  using namespace boost::archive::iterators;
+  using Decoder = transform_width<binary_from_base64<std::string::const_iterator>, 8, 6>;
+  const std::string text = base64.substr(0, base64.find('='));
+  std::vector<std::uint16_t> numbers;
+  Decoder at(text.begin());
+  for (std::size_t i = 0; i < text.size() * 6 / 16; ++i) {
+    const auto low = static_cast<std::uint8_t>(*at++), high = static_cast<std::uint8_t>(*at++);
+    numbers.push_back(static_cast<std::uint16_t>(low + 256 * high));
+  }
+  return numbers;
+}
+
+class ReportImage : public ProgramTest {};
+
+TEST_F(ReportImage, PicturesAreThoseOfTheRun) {
+  RunRecord run = example_results();
+  const Layer mean{"mean.0", {0, 1, 2, 3, 4, std::numeric_limits<Real>::quiet_NaN()}};
+  write_exr((folder_ / "a.exr").string(), 3, 2, {mean, {"lookups", {5, 5, 5, 5, 5, 5}}});
+  const LayeredImage read = read_exr((folder_ / "a.exr").string());
+  EXPECT_EQ(read.width, 3);
+  ASSERT_EQ(read.layers.size(), 2u);
+  EXPECT_EQ(read.layers[1].name, "mean.0");
+  EXPECT_EQ(read.layers[1].values[4], 4);
+
+  run.cells[0].cell.images = run.cells[1].cell.images = true;
+  run.cells[0].images["layers"] = run.cells[1].images["layers"] = "a.exr";
+  const std::string file = (folder_ / "r.json").string();
+  ReportData data = report_data({run}, {file}, "", "");
+  EXPECT_TRUE(data.warnings.empty());
+  EXPECT_EQ(data.json["images"].size(), 2u);  // each once
+  EXPECT_EQ(data.json["cells"][0]["images"], data.json["cells"][1]["images"]);
+  const Json& picture = data.json["images"][data.json["cells"][0]["images"]["mean"].get<std::size_t>()];
+  const std::vector<std::uint16_t> k = numbers_of(picture["data"]);
+  ASSERT_EQ(k.size(), 6u);
+  for (std::size_t i = 0; i < 5; ++i)
+    EXPECT_NEAR(picture["low"].get<Real>() + (picture["high"].get<Real>() - picture["low"].get<Real>()) * k[i] / 65534,
+                mean.values[i], 1e-4);
+  EXPECT_EQ(k[5], 65535);
+
+  run.cells[0].images["layers"] = "gone.exr";
+  data = report_data({run}, {file}, "", "");
+  EXPECT_EQ(data.warnings.size(), 1u);
+  EXPECT_TRUE(data.json["cells"][0]["images"].is_null());
+}
+
+TEST_F(ReportImage, LargePicturesAreAveragedDown) {
+  RunRecord run = example_results();
+  std::vector<Real> values(512 * 512);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<Real>(i % 2);  // every pair of pixels averages to 1/2
+  values[0] = 2;                                                                         // (2 + 1 + 0 + 1) / 4 = 1
+  write_exr((folder_ / "a.exr").string(), 512, 512, {{"mean.0", values}});
+  run.cells[0].images["layers"] = "a.exr";
+  const Json data = report_data({run}, {(folder_ / "r.json").string()}, "", "").json;
+  EXPECT_EQ(data["images"][0]["width"], 256);
+  EXPECT_EQ(data["images"][0]["low"], 0.5);
+  EXPECT_EQ(data["images"][0]["high"], 1);
+}
+
+class ReportCli : public ProgramTest {};
+
+TEST_F(ReportCli, WritesThePageAndASummary) {
+  write("c.json", R"({"$schema":"nullmark/config/1","timing":{"repetitions":2,"seconds":0.001},"experiments":[
+      {"name":"e","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":64,"images":true,
+       "matrix":{"estimator":["ratio","delta"],"medium":["linear"]}}]})");
+  ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");
+  ASSERT_EQ(run("report r.json -o r.html --markdown r.md"), 0) << read("err");
+  EXPECT_TRUE(read("out").empty());
+  EXPECT_GT(read("r.html").size(), 3'000'000u);
+  EXPECT_NE(read("r.md").find("| ratio |"), std::string::npos);
+  EXPECT_EQ(run("report none.json -o n.html"), 2);
+  EXPECT_EQ(run("report r.json -o none/n.html"), 2);
+  EXPECT_EQ(run("report r.json -o n.html --baseline dleta"), 2);
+  EXPECT_NE(read("err").find("did you mean \"delta\"?"), std::string::npos) << read("err");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "n.html"));
+}
+
+}  // namespace
+}  // namespace nullmark
