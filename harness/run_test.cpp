@@ -2,6 +2,7 @@
 
 #include "harness/run.h"
 
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <stdexcept>
 
 #include "harness/config.h"
+#include "harness/results_json.h"
 
 namespace nullmark {
 namespace {
@@ -52,6 +54,24 @@ TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
   ASSERT_TRUE(loose.verdict);
   EXPECT_NE(loose.verdict->unbiased, Outcome::fail);
   EXPECT_GT(loose.verdict->tests.at(0).reference_error, 1e-4);
+}
+
+/// A channel whose samples are not finite has no groups; the others keep theirs, and the results can be read.
+TEST(Run, AChannelThatIsNotFiniteTakesNothingFromTheOthers) {
+  const Plan cells = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
+      "samples_per_ray":64,"matrix":{"estimator":{"type":"residual_ratio","control":"average"},
+      "medium":[{"type":"linear","optical_depth":0.01,"spectrum":[1,1e6]},{"type":"linear","optical_depth":0.01,"spectrum":[1e6,1]}]}}]})",
+                                 "test.json");
+  RunRecord results;
+  results.cells = run(cells, 1, {});
+  const RunRecord again = read_results(results_text(results), "r.json");
+  for (const std::size_t finite : {std::size_t{0}, std::size_t{1}}) {
+    const CellRecord& record = again.cells.at(finite);
+    EXPECT_EQ(record.status, Status::error);
+    ASSERT_EQ(record.convergence.at(0).rmse.size(), 2u);
+    EXPECT_TRUE(record.convergence[0].rmse[finite]);
+    EXPECT_FALSE(record.convergence[0].rmse[1 - finite]);
+  }
 }
 
 /// Fewer samples share the cost of a walk through many cells, so each costs more; how much more is measured, not its sign alone.
