@@ -64,6 +64,7 @@ class CommandLine {
     add_check();
     add_compare();
     add_gate();
+    add_report();
     add_list();
     add_schema();
     add_export();
@@ -142,13 +143,17 @@ class CommandLine {
 
   void add_compare() {
     CLI::App* command = add("compare", "Rank estimators by what accuracy costs in time", [this] {
-      const std::string ranking = compare_results(load_all(files_), baseline_);
+      const std::vector<RunRecord> runs = load_all(files_);
+      const std::string ranking = compare_text(runs, baseline_, paired_);
       if (ranking.empty()) return report(ExitCode::nothing_ran, "no cell of these results was sampled; nothing to compare");
       fmt::print("{}", ranking);
+      if (!markdown_.empty()) write_atomically(markdown_, compare_markdown(runs, baseline_, paired_));
       return ExitCode::ok;
     });
     command->add_option("RESULTS", files_, "Results files")->required();
     command->add_option("--baseline", baseline_, "Estimator to compare the others with");
+    command->add_flag("--paired", paired_, "Also compare mean squared errors on common random streams");
+    command->add_option("--markdown", markdown_, "Also write the tables for a pull request");
   }
 
   void add_gate() {
@@ -166,6 +171,16 @@ class CommandLine {
     command->add_flag("--update", gate_.update, "Make the results the baseline")->excludes(blocks);
     command->add_option("--junit", gate_.junit, "Also write a JUnit report");
     command->add_option("--markdown", gate_.markdown, "Also write a summary for a pull request");
+  }
+
+  void add_report() {
+    CLI::App* command =
+        add("report", "Write one self-contained page with tables and plots", [this] { return report_command(report_); });
+    command->add_option("RESULTS", report_.results, "Results files")->required();
+    command->add_option("-o,--output", report_.output, "HTML file to write; one that is there is replaced")->required();
+    command->add_option("--baseline", report_.baseline, "Estimator to compare the others with");
+    command->add_option("--figures", report_.figures, "Folder for the main plots as PNG and SVG; needs Chromium");
+    command->add_option("--markdown", report_.markdown, "Also write the rankings for a pull request");
   }
 
   void add_list() {
@@ -227,11 +242,12 @@ class CommandLine {
   std::function<ExitCode()> action_;
   RunCommand run_;
   GateCommand gate_;
+  ReportCommand report_;
   ListCommand list_;
   ProceduralVdb volume_;
   std::vector<std::string> files_;
   std::string file_, baseline_, schema_, format_, output_, junit_, markdown_;
-  bool force_ = false;
+  bool force_ = false, paired_ = false;
 };
 
 /// Cells of two trackers of one name could not be told apart.

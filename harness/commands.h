@@ -33,6 +33,15 @@ struct GateCommand {
 };
 ExitCode gate_command(const GateCommand& command);
 
+/// `nullmark report`.
+struct ReportCommand {
+  std::vector<std::string> results;
+  std::string output;             ///< the page
+  std::string baseline;           ///< tracker that others are compared with; empty: the fastest unbiased one
+  std::string figures, markdown;  ///< folder and file; empty: none
+};
+ExitCode report_command(const ReportCommand& command);
+
 /// `nullmark list`.
 struct ListCommand {
   std::string what;  ///< "estimators", "media", "majorants", "rays" or "quantities"

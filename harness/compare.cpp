@@ -4,116 +4,117 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
-#include "harness/cell_names.h"
-#include "harness/json_input.h"
-#include "harness/names.h"
-#include "harness/transport_json.h"
+#include "harness/comparison.h"
+#include "harness/summary.h"
+#include "harness/table.h"
 
 namespace nullmark {
 namespace {
 
-struct Row {
-  const CellRecord* record;
-  Efficiency efficiency;
-};
+using Line = std::vector<std::string>;
 
-/// Unknown and unreachable times sort last, exact estimators (no variance) first.
-Real sort_key(const Row& row) { return row.efficiency.seconds_to_1pct.value_or(kInfinity); }
+/// "0.0123", "0.0123 ±4 %", "0.0123 [0.001, inf]" where the interval is wide.
+std::string shown(const Interval& x) {
+  if (x.exact()) return fmt::format("{:.3g}", x.value);
+  const Real half = std::max(x.high / x.value - 1, 1 - x.low / x.value);
+  if (half < 0.0005) return fmt::format("{:.3g}", x.value);
+  return half < 0.5 ? fmt::format("{:.3g} ±{:.2g} %", x.value, 100 * half)
+                    : fmt::format("{:.3g} [{:.2g}, {:.2g}]", x.value, x.low, x.high);
+}
+std::string shown(const std::optional<Interval>& x) { return x ? shown(*x) : "-"; }
 
-std::string number(const std::optional<Real>& value) { return value ? fmt::format("{:.3g}", *value) : "-"; }
-
-std::string ratio(const std::optional<Real>& value, const std::optional<Real>& base) {
-  return value && base && *base > 0 ? fmt::format("{:.2f}x", *value / *base) : "-";
+std::string time_shown(const std::optional<Interval>& seconds) {
+  return seconds && !std::isfinite(seconds->value) ? "never" : shown(seconds);
 }
 
-std::string group_of(const CellRecord& record) {
-  const std::string light = transport_label(record.cell.transport);
-  return fmt::format("{} | {} | {} | {}{}", to_string(record.cell.quantity), record.medium.label, record.majorant.label,
-                     record.ray_set.label, light.empty() ? "" : " | " + light);
+std::string rank_shown(const Contender& contender) {
+  return contender.rank ? fmt::format("{}{}", *contender.rank, contender.tied ? "=" : "") : "-";
+}
+
+std::string floor_shown(const Contender& contender) {
+  if (!contender.cost || !contender.cost->floor) return "";
+  const Interval& floor = *contender.cost->floor;
+  if (floor.high == 0) return "";
+  return floor.low > 0 ? fmt::format("{:.2g} %", 100 * floor.value) : fmt::format("< {:.2g} %", 100 * floor.high);
+}
+
+std::string break_even_shown(const Contender& contender) {
+  if (!contender.break_even) return "";
+  switch (contender.break_even->kind) {
+    case BreakEven::Kind::never_cheaper:
+      return "never cheaper";
+    case BreakEven::Kind::no_floor_seen:
+      return "no floor seen";
+    case BreakEven::Kind::at:
+      break;
+  }
+  return fmt::format("{} s, at {:.2g} %", shown(contender.break_even->seconds), 100 * contender.break_even->error.value);
+}
+
+bool any_floor(const Contest& contest) {
+  return std::any_of(contest.contenders.begin(), contest.contenders.end(),
+                     [](const Contender& contender) { return contender.cost && contender.cost->floor; });
+}
+
+std::vector<Line> ranking(const Contest& contest) {
+  const bool floors = any_floor(contest);
+  Line heading = {"", "estimator", "variance", "variance x lookups", "variance x ns", "s to 1 %", "s to 0.1 %", "/ baseline"};
+  if (floors) heading.insert(heading.end(), {"floor", "cheaper than the best unbiased until"});
+  std::vector<Line> lines = {heading};
+  for (const Contender& contender : contest.contenders) {
+    const std::optional<Cost>& cost = contender.cost;
+    lines.push_back({rank_shown(contender), contender.label, cost ? shown(cost->variance) : "-",
+                     cost ? shown(cost->variance_x_lookups) : "-", cost ? shown(cost->variance_x_ns) : "-",
+                     time_shown(contender.seconds[0]), time_shown(contender.seconds[1]), shown(contender.relative)});
+    if (floors) lines.back().insert(lines.back().end(), {floor_shown(contender), break_even_shown(contender)});
+  }
+  return lines;
+}
+
+std::vector<Line> pairs(const Contest& contest) {
+  std::vector<Line> lines = {{"estimator", "mean squared error / baseline's, same streams", "as if the streams were others"}};
+  for (const Pairing& pairing : contest.pairings)
+    lines.push_back({contest.contenders[pairing.contender].label, shown(pairing.ratio), shown(pairing.unpaired)});
+  return lines;
+}
+
+std::string baseline_line(const Contest& contest) {
+  return contest.baseline ? fmt::format("baseline: {}", contest.contenders[*contest.baseline].label) : "no baseline here";
+}
+
+std::string markdown_table(const std::vector<Line>& lines) {
+  std::string text;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    for (const std::string& word : lines[i]) text += fmt::format("| {} ", escaped(word));
+    text += "|\n";
+    if (i > 0) continue;
+    for (std::size_t c = 0; c < lines[0].size(); ++c) text += "|---";
+    text += "|\n";
+  }
+  return text;
 }
 
 }  // namespace
 
-Efficiency efficiency(const CellRecord& record) {
-  Efficiency out;
-  if (record.status != Status::ok || record.channel.empty()) return out;
-  Real variance = 0, bias = 0, reference = 0;
-  for (const ChannelRecord& channel : record.channel) {
-    const auto best = channel.variance_theory ? channel.variance_theory : channel.variance;
-    if (!best || !channel.reference) return out;
-    variance += *best;
-    reference += *channel.reference * *channel.reference;
-    // Only estimators that do not claim to be unbiased have a floor; the others' measured bias is noise.
-    if ((record.claims == "consistent" || record.claims == "biased") && channel.rmse)
-      bias += std::max<Real>(0, *channel.rmse * *channel.rmse - *best / static_cast<Real>(record.cell.samples_per_ray));
-    if (!channel.variance_theory && channel.kurtosis)
-      out.relative_error = std::max(out.relative_error, std::sqrt(std::max<Real>(0, *channel.kurtosis - 1) /
-                                                                  static_cast<Real>(std::max<std::uint64_t>(1, record.samples))));
+std::string compare_text(const std::vector<RunRecord>& runs, const std::string& baseline, bool paired) {
+  std::string text;
+  for (const Contest& contest : contests(runs, baseline)) {
+    text += fmt::format("{}\n{}", contest.name, aligned(ranking(contest), 2));
+    if (paired && !contest.pairings.empty()) text += aligned(pairs(contest), 1);
+    text += baseline_line(contest) + "\n\n";
   }
-  const auto channels = static_cast<Real>(record.channel.size());
-  variance /= channels;
-  out.variance = variance;
-  if (reference > 0) out.floor = std::sqrt(bias / reference);
-  if (record.lookups_per_sample) out.variance_x_lookups = variance * *record.lookups_per_sample;
-  if (record.time) {
-    out.variance_x_ns = variance * record.time->ns_per_sample;
-    constexpr Real kTarget = 0.01;
-    const Real room = kTarget * kTarget * reference / channels - bias / channels;
-    if (room > 0) out.seconds_to_1pct = std::max<Real>(1, variance / room) * record.time->ns_per_sample * 1e-9;
-  }
-  return out;
+  return text;
 }
 
-std::string compare_results(const std::vector<RunRecord>& runs, const std::string& baseline) {
-  std::map<std::string, std::vector<Row>> groups;
-  std::vector<std::string> order;
-  std::vector<std::string> known;
-  for (const RunRecord& run : runs)
-    for (const CellRecord& record : run.cells) {
-      if (record.status != Status::ok || !record.outputs.empty()) continue;
-      std::vector<Row>& rows = groups[group_of(record)];
-      if (rows.empty()) order.push_back(group_of(record));
-      rows.push_back({&record, efficiency(record)});
-      known.insert(known.end(), {tracker_label(record.cell), record.cell.estimator.type});
-    }
-  if (!baseline.empty() && std::find(known.begin(), known.end(), baseline) == known.end()) {
-    const std::string near = nearest(baseline, known);
-    throw InputError(fmt::format("--baseline: no cell of the results has the estimator \"{}\"{}", baseline,
-                                 near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
+std::string compare_markdown(const std::vector<RunRecord>& runs, const std::string& baseline, bool paired) {
+  std::string text;
+  for (const Contest& contest : contests(runs, baseline)) {
+    text += fmt::format("**{}**\n\n{}\n", escaped(contest.name), markdown_table(ranking(contest)));
+    if (paired && !contest.pairings.empty()) text += markdown_table(pairs(contest)) + "\n";
+    text += baseline_line(contest) + "\n\n";
   }
-
-  std::string out;
-  for (const std::string& name : order) {
-    std::vector<Row>& rows = groups[name];
-    std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return sort_key(a) < sort_key(b); });
-    const auto is_base = [&](const Row& row) {
-      return baseline.empty() ? row.record->claims == "unbiased"
-                              : tracker_label(row.record->cell) == baseline || row.record->cell.estimator.type == baseline;
-    };
-    const auto base = std::find_if(rows.begin(), rows.end(), is_base);
-    const Efficiency none, &reference = base == rows.end() ? none : base->efficiency;
-    std::size_t width = 9;
-    for (const Row& row : rows) width = std::max(width, tracker_label(row.record->cell).size());
-    out += fmt::format("{}\n  {:<{}} {:>10} {:>10} {:>8} {:>10} {:>8} {:>10} {:>8} {:>9}\n", name, "estimator", width, "variance",
-                       "var x look", "", "var x ns", "", "s to 1 %", "", "floor");
-    for (const Row& row : rows) {
-      const Efficiency& e = row.efficiency;
-      const std::string error = e.relative_error > 0 ? fmt::format(" +-{:.1f}%", 196 * e.relative_error) : "";
-      const bool floored = e.floor && *e.floor > 0 && row.record->claims != "unbiased" && row.record->claims != "exact";
-      out += fmt::format(
-          "  {:<{}} {:>10} {:>10} {:>8} {:>10} {:>8} {:>10} {:>8} {:>9}{}\n", tracker_label(row.record->cell), width,
-          number(e.variance), number(e.variance_x_lookups), ratio(e.variance_x_lookups, reference.variance_x_lookups),
-          number(e.variance_x_ns), ratio(e.variance_x_ns, reference.variance_x_ns),
-          e.seconds_to_1pct  ? fmt::format("{:.3g}", *e.seconds_to_1pct)
-          : row.record->time ? "never"
-                             : "-",
-          ratio(e.seconds_to_1pct, reference.seconds_to_1pct), floored ? fmt::format("{:.2g} %", 100 * *e.floor) : "", error);
-    }
-    out += "\n";
-  }
-  return out;
+  return text;
 }
 
 }  // namespace nullmark

@@ -383,14 +383,25 @@ bool same_statistics(const Draft& a, const Draft& b) {
          a.cell.equal_lookups == b.cell.equal_lookups && a.cell.seed == b.cell.seed && a.cell.own_streams == b.cell.own_streams;
 }
 
+std::vector<std::uint64_t> read_batches(const Place& place) {
+  const auto one = [](const Place& number) { return number.unsigned_integer(1, 1u << 20); };
+  if (!place.json().is_array()) return {one(place)};
+  std::vector<std::uint64_t> batches;
+  for (const Place& element : place.elements()) {
+    batches.push_back(one(element));
+    if (batches.size() > 1 && batches.back() <= batches[batches.size() - 2]) element.expected("more than the number before it");
+  }
+  if (batches.empty()) place.expected("at least one number");
+  return batches;
+}
+
 TimingPlan read_timing(const Place& place) {
   place.expect_keys({"enabled", "repetitions", "seconds", "samples_per_traversal"});
   TimingPlan timing;
   if (place.has("enabled")) timing.enabled = place["enabled"].boolean();
   if (place.has("repetitions")) timing.repetitions = static_cast<int>(place["repetitions"].integer(1, 10'000));
   if (place.has("seconds")) timing.seconds = read_positive(place["seconds"]);
-  if (place.has("samples_per_traversal"))
-    timing.samples_per_traversal = place["samples_per_traversal"].unsigned_integer(1, 1u << 20);
+  if (place.has("samples_per_traversal")) timing.samples_per_traversal = read_batches(place["samples_per_traversal"]);
   return timing;
 }
 
@@ -438,6 +449,7 @@ struct DraftPlan {
   GateLevels levels;
   std::vector<Draft> cells;
   std::vector<DraftTable> tables;
+  std::map<std::string, std::string> credits;
 };
 
 Selector read_selector(const Place& place, const std::vector<Draft>& drafts, const std::vector<std::string>& experiments) {
@@ -507,7 +519,7 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
     top.fail(fmt::format("found {}; expected the first key \"$schema\": \"{}\"",
                          json.empty() ? "an empty object" : "\"" + json.begin().key() + "\"", kConfigSchema));
   if (top["$schema"].string() != kConfigSchema) top["$schema"].expected(fmt::format("\"{}\"", kConfigSchema));
-  top.expect_keys({"$schema", "name", "seed", "timing", "verdict", "experiments", "tables"});
+  top.expect_keys({"$schema", "name", "seed", "timing", "verdict", "experiments", "tables", "credits"});
 
   DraftPlan plan;
   plan.file = source.file;
@@ -535,6 +547,10 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
   if (plan.cells.empty()) top["experiments"].expected("at least one experiment");
   if (top.has("tables"))
     for (const Place& entry : top["tables"].elements()) plan.tables.push_back(read_table(entry, plan.cells, experiments));
+  if (top.has("credits")) {
+    top["credits"].expect_object();
+    for (const auto& [name, json] : top["credits"].json().items()) plan.credits[name] = top["credits"][name].string();
+  }
   return plan;
 }
 
@@ -592,6 +608,7 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
       throw InputError(fmt::format("{}: /verdict: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
     for (const Draft& draft : file.cells) builder.add(draft);
+    plan.credits.insert(file.credits.begin(), file.credits.end());
   }
   name_cells(plan);
   std::size_t first = 0;

@@ -3,6 +3,7 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <spng.h>
 
@@ -63,6 +64,32 @@ void write_exr(const std::string& path, int width, int height, const std::vector
   Imf::OutputFile file(path.c_str(), header);
   file.setFrameBuffer(frame);
   file.writePixels(height);
+}
+
+LayeredImage read_exr(const std::string& path) {
+  Imf::InputFile file(path.c_str());
+  const Imath::Box2i window = file.header().dataWindow();
+  LayeredImage image{window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, {}};
+  for (auto channel = file.header().channels().begin(); channel != file.header().channels().end(); ++channel) {
+    if (channel.channel().type != Imf::FLOAT || channel.channel().xSampling != 1 || channel.channel().ySampling != 1)
+      throw std::runtime_error(path + ": channels are not 32-bit floats, one a pixel");
+    image.layers.push_back({channel.name(), {}});
+  }
+  const auto w = static_cast<std::size_t>(image.width), h = static_cast<std::size_t>(image.height);
+  constexpr std::size_t kMost = std::size_t{1} << 26;
+  if (w * h * image.layers.size() > kMost) throw std::runtime_error(path + ": too large");
+  std::vector<std::vector<float>> pixels(image.layers.size(), std::vector<float>(w * h));
+  Imf::FrameBuffer frame;
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    frame.insert(image.layers[i].name, Imf::Slice::Make(Imf::FLOAT, pixels[i].data(), window, sizeof(float), w * sizeof(float)));
+  file.setFrameBuffer(frame);
+  file.readPixels(window.min.y, window.max.y);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    image.layers[i].values.resize(w * h);
+    for (std::size_t y = 0; y < h; ++y)
+      for (std::size_t x = 0; x < w; ++x) image.layers[i].values[(h - 1 - y) * w + x] = pixels[i][y * w + x];
+  }
+  return image;
 }
 
 }  // namespace nullmark

@@ -23,4 +23,13 @@ struct Layer {
 /// cannot be written.
 void write_exr(const std::string& path, int width, int height, const std::vector<Layer>& layers);
 
+struct LayeredImage {
+  int width = 0, height = 0;
+  std::vector<Layer> layers;
+};
+
+/// The channels of an OpenEXR file, all of which must be 32-bit floats of one number a pixel.  Throws std::runtime_error when it
+/// cannot be read or is larger than 2^26 numbers.
+LayeredImage read_exr(const std::string& path);
+
 }  // namespace nullmark

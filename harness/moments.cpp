@@ -63,6 +63,20 @@ void Moments::add(std::span<const Real> errors) {
   *this += sum;
 }
 
+void BlockErrors::add(std::size_t ray, std::span<const Real> errors, Moments& moments) {
+  // Fewer would leave registers empty.
+  constexpr std::size_t kLeastRun = 64;
+  const std::size_t run = errors.size() / kBlocks >= kLeastRun ? (errors.size() + kBlocks - 1) / kBlocks : errors.size();
+  std::size_t block = run == errors.size() ? ray % kBlocks : 0;
+  for (std::size_t first = 0; first < errors.size(); first += run, ++block) {
+    Moments part;
+    part.add(errors.subspan(first, std::min(run, errors.size() - first)));
+    moments += part;
+    squares[block] += part.s2;
+    count[block] += part.count;
+  }
+}
+
 /// Errors that are added together at once: their sums stay near.
 constexpr std::size_t kFew = 1024;
 

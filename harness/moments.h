@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -37,6 +38,27 @@ struct Moments {
     const auto n = static_cast<Real>(count);
     return std::max<Real>(0, (s2 - s1 * s1 / n) / (n - 1));
   }
+};
+
+/// Squared errors of sixteen disjoint parts of a cell's samples.  Which part a sample belongs to follows from rays and samples
+/// alone, so that estimators on the same streams have parts that go together.
+struct BlockErrors {
+  static constexpr std::size_t kBlocks = 16;
+
+  /// The next errors of a ray, which are added to its moments as well: a run of them to each block, or all to that of the ray
+  /// where they are few.
+  void add(std::size_t ray, std::span<const Real> errors, Moments& moments);
+
+  BlockErrors& operator+=(const BlockErrors& other) {
+    for (std::size_t b = 0; b < kBlocks; ++b) {
+      squares[b] += other.squares[b];
+      count[b] += other.count[b];
+    }
+    return *this;
+  }
+
+  std::array<Real, kBlocks> squares{};
+  std::array<std::uint64_t, kBlocks> count{};
 };
 
 /// Squared errors of the means of 1, 2, 4, ... consecutive samples, over all disjoint groups of each size.  Groups of one ray

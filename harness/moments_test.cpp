@@ -33,6 +33,30 @@ TEST(Moments, AreThePowerSumsOfAnyNumberOfErrors) {
   }
 }
 
+TEST(BlockErrors, HoldEveryErrorOnce) {
+  for (const std::size_t count : {1, 100, 1023, 1024, 5000, 16384}) {
+    const std::vector<Real> x = errors(count);
+    BlockErrors blocks;
+    Moments moments, expected;
+    blocks.add(3, x, moments);
+    expected.add(x);
+    Real squares = 0;
+    std::uint64_t counted = 0, used = 0;
+    for (std::size_t b = 0; b < BlockErrors::kBlocks; ++b) {
+      squares += blocks.squares[b];
+      counted += blocks.count[b];
+      used += blocks.count[b] > 0;
+    }
+    EXPECT_EQ(counted, count);
+    EXPECT_EQ(moments.count, count);
+    EXPECT_NEAR(squares, expected.s2, 1e-12 * expected.s2);
+    EXPECT_NEAR(moments.s4, expected.s4, 1e-12 * expected.s4);
+    // Few errors of a ray go to the ray's block, many to all.
+    EXPECT_EQ(used, count < 1024 ? 1u : BlockErrors::kBlocks);
+    EXPECT_EQ(blocks.count[3], count < 1024 ? count : (count + 15) / 16);
+  }
+}
+
 /// Every disjoint group of 2^level consecutive errors, one by one.
 std::vector<GroupErrors::Level> one_by_one(const std::vector<Real>& x) {
   std::vector<GroupErrors::Level> levels;

@@ -133,8 +133,10 @@ struct Cell {
 struct TimingPlan {
   bool enabled = true;
   int repetitions = 5;
-  Real seconds = 0.02;                       ///< least time of one repetition
-  std::uint64_t samples_per_traversal = 64;  ///< samples that share one walk through the majorant structure
+  Real seconds = 0.02;  ///< least time of one repetition
+  /// Samples that share one walk through the majorant structure, ascending.  The last is what a cell's time says; those before it
+  /// tell what fewer samples cost.
+  std::vector<std::uint64_t> samples_per_traversal{64};
 };
 
 /// A row of a published table beside the cells that answer it.
@@ -162,7 +164,8 @@ struct Plan {
   TimingPlan timing;
   GateLevels levels;
   std::vector<Table> tables;
-  std::string config_text;  ///< the configuration as applied, JSON
+  std::map<std::string, std::string> credits;  ///< author and licence, by a data file's name
+  std::string config_text;                     ///< the configuration as applied, JSON
 };
 
 }  // namespace nullmark

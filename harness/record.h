@@ -24,12 +24,19 @@ struct ChannelRecord {
   std::optional<Real> variance_theory;
   std::optional<Real> relative_variance;  ///< variance (theory where known) over the mean square of the reference
   std::optional<Real> kurtosis;           ///< of the errors around the reference, pooled
+  std::optional<Real> reference_rms;      ///< root mean square over the rays
 };
 
 /// Error of the mean of n samples, measured over all disjoint groups of n.
 struct ConvergenceRecord {
   std::uint64_t samples = 0;
   std::vector<std::optional<Real>> rmse, variance;  ///< per channel
+};
+
+/// What a sample costs where so many share a walk through the majorant structure.
+struct BatchTime {
+  std::uint64_t samples_per_traversal = 1;
+  Real ns_per_sample = 0, mad = 0;
 };
 
 struct TimeRecord {
@@ -41,7 +48,8 @@ struct TimeRecord {
   std::uint64_t samples_per_traversal = 1;
   std::vector<Real> repetition_ns;  ///< ns per sample of each repetition
   Real majorant_build_seconds = 0;  ///< wall time of building the majorant structure, on all threads
-  Real memory_ratio = 0;  ///< of volumes: ns per lookup over one read of a random cache line of as many bytes; else 0
+  std::vector<BatchTime> batches;   ///< ascending; the last is that of ns_per_sample; empty where it is the only one
+  Real memory_ratio = 0;            ///< of volumes: ns per lookup over one read of a random cache line of as many bytes; else 0
 };
 
 /// PASS: |bias| < epsilon is proven.  FAIL: bias is proven.  INCONCLUSIVE: neither, with the reason.  VIOLATED: the estimator
@@ -120,6 +128,9 @@ struct CellRecord {
   std::optional<TimeRecord> time;
   std::optional<VerdictRecord> verdict;
   std::vector<ConvergenceRecord> convergence;
+  /// Mean squared errors of disjoint parts of the samples (BlockErrors), averaged over channels; estimators on the same streams
+  /// have the same parts.  Empty where there are too few samples, and for quantities with several numbers a channel.
+  std::vector<Real> squared_error_blocks;
   std::map<std::string, std::string> images;  ///< "mean", "variance", "lookups" -> path relative to the results file
 };
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/compare.h"
+#include "harness/cost.h"
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/parameter_values.h"
@@ -67,6 +67,13 @@ Json time_json(const CellRecord& record) {
   const TimeRecord& time = *record.time;
   Json repetitions = Json::array();
   for (const Real ns : time.repetition_ns) repetitions.push_back(real(ns));
+  Json batches = Json::array();
+  for (const BatchTime& batch : time.batches)
+    batches.push_back({{"samples_per_traversal", batch.samples_per_traversal},
+                       {"ns_per_sample", real(batch.ns_per_sample)},
+                       {"mad", real(batch.mad)}});
+  const std::optional<Cost> cost = cost_of(record);
+  const std::optional<Interval> to_one_percent = cost ? seconds_to(*cost, 0.01) : std::nullopt;
   return {{"ns_per_sample", real(time.ns_per_sample)},
           {"ns_per_lookup", real(time.ns_per_lookup)},
           {"floor_ratio", real(time.floor_ratio)},
@@ -77,10 +84,11 @@ Json time_json(const CellRecord& record) {
           {"threads", time.threads},
           {"traversal_included", true},
           {"samples_per_traversal", time.samples_per_traversal},
+          {"batches", std::move(batches)},
           {"repetition_ns", std::move(repetitions)},
           {"majorant_build_seconds", real(time.majorant_build_seconds)},
           {"variance_x_ns", per_channel(record, [&](std::size_t c) { return variance_x_ns(record, c); })},
-          {"seconds_to_1pct", real(efficiency(record).seconds_to_1pct)}};
+          {"seconds_to_1pct", real(to_one_percent ? std::optional(to_one_percent->value) : std::nullopt)}};
 }
 
 Json convergence_json(const CellRecord& record) {
@@ -196,6 +204,10 @@ TimeRecord read_time(const Place& place) {
   time.repetitions = static_cast<int>(place["repetitions"].integer(0, std::numeric_limits<int>::max()));
   time.threads = static_cast<int>(place["threads"].integer(0, std::numeric_limits<int>::max()));
   time.samples_per_traversal = count(place, "samples_per_traversal");
+  if (place.has("batches"))
+    for (const Place& batch : place["batches"].elements())
+      time.batches.push_back({batch["samples_per_traversal"].unsigned_integer(1, kAny), real_or_nan(batch, "ns_per_sample"),
+                              real_or_nan(batch, "mad")});
   time.majorant_build_seconds = real_or_nan(place, "majorant_build_seconds");
   if (place.has("repetition_ns"))
     for (const Place& ns : place["repetition_ns"].elements())
@@ -219,6 +231,7 @@ void read_statistics(const Place& place, CellRecord& record) {
   read(place, "kurtosis", &ChannelRecord::kurtosis);
   read(place["reference"], "value", &ChannelRecord::reference);
   read(place["reference"], "error", &ChannelRecord::reference_error);
+  read(place["reference"], "rms", &ChannelRecord::reference_rms);
 }
 
 std::vector<Table> read_tables(const Place& place) {
@@ -289,6 +302,7 @@ Json cell_json(const CellRecord& record) {
       {"reference",
        {{"value", field(record, &ChannelRecord::reference)},
         {"error", field(record, &ChannelRecord::reference_error)},
+        {"rms", field(record, &ChannelRecord::reference_rms)},
         {"method", record.reference_method}}},
       {"bias", field(record, &ChannelRecord::bias)},
       {"rmse", field(record, &ChannelRecord::rmse)},
@@ -305,6 +319,7 @@ Json cell_json(const CellRecord& record) {
       {"lookups", record.lookups},
       {"rng_draws", record.draws},
       {"lookups_variance", real(record.lookups_variance)},
+      {"squared_error_blocks", record.squared_error_blocks},
       {"majorant_violations", record.majorant_violations},
       {"largest_violation", real(record.largest_violation)},
       {"nonfinite", record.nonfinite},
@@ -365,6 +380,8 @@ CellRecord read_cell(const Place& place) {
   record.lookups = count(place, "lookups");
   record.draws = count(place, "rng_draws");
   record.lookups_variance = optional_real(place, "lookups_variance");
+  if (place.has("squared_error_blocks"))
+    for (const Place& block : place["squared_error_blocks"].elements()) record.squared_error_blocks.push_back(block.number());
   if (place.has("instructions")) record.instructions = count(place, "instructions");
   record.majorant_violations = count(place, "majorant_violations");
   record.largest_violation = optional_real(place, "largest_violation");

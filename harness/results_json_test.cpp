@@ -43,8 +43,8 @@ TEST(ResultsJson, EveryFieldComesBackBitForBit) {
     ASSERT_EQ(a.channel.size(), b.channel.size());
     for (std::size_t c = 0; c < a.channel.size(); ++c) {
       const auto fields = [](const ChannelRecord& r) {
-        return std::vector{r.mean,     r.reference,       r.reference_error,   r.bias,    r.rmse, r.rmse_theory,
-                           r.variance, r.variance_theory, r.relative_variance, r.kurtosis};
+        return std::vector{r.mean,     r.reference,       r.reference_error,   r.bias,     r.rmse,         r.rmse_theory,
+                           r.variance, r.variance_theory, r.relative_variance, r.kurtosis, r.reference_rms};
       };
       EXPECT_EQ(fields(a.channel[c]), fields(b.channel[c]));
     }
@@ -56,6 +56,11 @@ TEST(ResultsJson, EveryFieldComesBackBitForBit) {
     EXPECT_EQ(a.time->repetition_ns, b.time->repetition_ns);
     EXPECT_EQ(a.time->loop_ratio, b.time->loop_ratio);
     EXPECT_EQ(a.time->majorant_build_seconds, b.time->majorant_build_seconds);
+    EXPECT_EQ(a.squared_error_blocks, b.squared_error_blocks);
+    ASSERT_EQ(b.time->batches.size(), 2u);
+    EXPECT_EQ(b.time->batches[0].samples_per_traversal, 1u);
+    EXPECT_EQ(b.time->batches[0].ns_per_sample, a.time->batches[0].ns_per_sample);
+    EXPECT_EQ(b.time->batches[0].mad, a.time->batches[0].mad);
     EXPECT_EQ(a.structure, b.structure);
     ASSERT_EQ(a.convergence.size(), b.convergence.size());
     EXPECT_EQ(a.convergence[1].variance, b.convergence[1].variance);

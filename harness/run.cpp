@@ -446,6 +446,17 @@ std::optional<Real> lookups_variance(const Sampled& sampled, Real samples_per_ra
   return std::nullopt;
 }
 
+/// See CellRecord::squared_error_blocks.
+std::vector<Real> squared_error_blocks(const Sampled& sampled) {
+  std::vector<Real> mean(BlockErrors::kBlocks);
+  for (const BlockErrors& output : sampled.blocks)
+    for (std::size_t b = 0; b < mean.size(); ++b) {
+      if (output.count[b] == 0 || !std::isfinite(output.squares[b])) return {};
+      mean[b] += output.squares[b] / static_cast<Real>(output.count[b]) / static_cast<Real>(sampled.blocks.size());
+    }
+  return mean;
+}
+
 void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled) {
   const Cell& cell = *prepared.cell;
   const auto rays = static_cast<std::size_t>(record.rays);
@@ -475,6 +486,7 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
     record.reason = fmt::format("{} walks exceeded the bound on lookups", sampled.counters.overruns);
   }
   record.variance_basis = "sample";
+  if (targets.known && targets.names.empty()) record.squared_error_blocks = squared_error_blocks(sampled);
   for (std::size_t o = 0; o < outputs; ++o) {
     Moments pooled;
     Real mean = 0, reference = 0, reference_square = 0, error = 0, bias = 0, squares = 0, variance = 0;
@@ -495,6 +507,7 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
     if (targets.known) {
       out.reference = finite(reference / n);
       out.reference_error = finite(error / n);
+      out.reference_rms = finite(std::sqrt(reference_square / n));
       out.bias = finite(bias / n);
       out.rmse = finite(std::sqrt(squares / n));
     }
@@ -520,7 +533,8 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
   }
 }
 
-/// What a cell's pixels hold, unrounded but for single precision: mean, reference and variance per channel, and lookups.
+/// What a cell's pixels hold, unrounded but for single precision: mean, reference and variance per channel, lookups and null
+/// collisions.
 std::vector<Layer> layers(const PreparedCell& prepared, const Sampled& sampled) {
   const std::size_t outputs = prepared.targets.outputs, rays = prepared.scene->rays->world.size();
   std::vector<Layer> all;
@@ -537,8 +551,11 @@ std::vector<Layer> layers(const PreparedCell& prepared, const Sampled& sampled) 
     if (prepared.targets.known) add(fmt::format("reference.{}", o), truth);
     add(fmt::format("variance.{}", o), [&](std::size_t ray) { return moments(ray).variance(); });
   }
-  add("lookups",
-      [&](std::size_t ray) { return static_cast<Real>(sampled.lookups[ray]) / static_cast<Real>(prepared.samples_per_ray); });
+  const auto per_sample = [&](std::uint64_t count) {
+    return static_cast<Real>(count) / static_cast<Real>(prepared.samples_per_ray);
+  };
+  add("lookups", [&](std::size_t ray) { return per_sample(sampled.lookups[ray]); });
+  add("null_collisions", [&](std::size_t ray) { return per_sample(sampled.null_collisions[ray]); });
   return all;
 }
 
@@ -548,7 +565,7 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
   if (!prepared.cell->images || !prepared.targets.names.empty() || rays.width == 0 || options.image_directory.empty()) return;
   const auto channels = static_cast<std::size_t>(record.channels);
   const std::size_t shown = channels >= 3 ? 3 : 1, outputs = prepared.targets.outputs;
-  std::vector<Real> mean, variance, reference, lookups;
+  std::vector<Real> mean, variance, reference, lookups, null_collisions;
   for (std::size_t ray = 0; ray < rays.world.size(); ++ray) {
     for (std::size_t c = 0; c < shown; ++c) {
       const Moments& moments = sampled.moments[ray * outputs + c];
@@ -557,6 +574,7 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
       variance.push_back(moments.variance());
     }
     lookups.push_back(static_cast<Real>(sampled.lookups[ray]) / static_cast<Real>(prepared.samples_per_ray));
+    null_collisions.push_back(static_cast<Real>(sampled.null_collisions[ray]) / static_cast<Real>(prepared.samples_per_ray));
   }
   const auto greatest = [](const std::vector<Real>& values) {
     const Real most = *std::max_element(values.begin(), values.end());
@@ -574,6 +592,7 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
     if (prepared.targets.known) write("reference", reference, shown, prepared.cell->image_maximum);
     write("variance", variance, shown, greatest(variance));
     write("lookups", lookups, 1, greatest(lookups));
+    write("null_collisions", null_collisions, 1, greatest(null_collisions));
     const std::string file = fmt::format("{}.exr", prepared.cell->id);
     write_exr((std::filesystem::path(options.image_directory) / file).string(), rays.width, rays.height,
               layers(prepared, sampled));

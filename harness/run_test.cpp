@@ -54,6 +54,23 @@ TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
   EXPECT_GT(loose.verdict->tests.at(0).reference_error, 1e-4);
 }
 
+/// Fewer samples share the cost of a walk through many cells, so each costs more; how much more is measured, not its sign alone.
+TEST(Run, TimesEveryNumberOfSamplesPerTraversal) {
+  const Plan cells =
+      read_config(R"({"$schema":"nullmark/config/1","timing":{"repetitions":3,"seconds":0.002,"samples_per_traversal":[1,16,64]},
+      "experiments":[{"name":"e","rays":"single","samples_per_ray":10,"gate":{"enabled":false},
+      "matrix":{"estimator":"ratio","medium":"linear","majorant":{"type":"grid","resolution":64}}}]})",
+                  "test.json");
+  const CellRecord record = run_plan(cells, {true}, {}, {}, {}).at(0);
+  ASSERT_TRUE(record.time);
+  EXPECT_EQ(record.time->samples_per_traversal, 64u);
+  ASSERT_EQ(record.time->batches.size(), 3u);
+  EXPECT_EQ(record.time->batches[1].samples_per_traversal, 16u);
+  EXPECT_EQ(record.time->batches[2].ns_per_sample, record.time->ns_per_sample);
+  EXPECT_GT(record.time->batches[0].ns_per_sample, 4 * record.time->ns_per_sample);
+  EXPECT_EQ(record.time->repetition_ns.size(), 3u);
+}
+
 TEST(Run, TellsOfEveryCellOnceAndOneAtATime) {
   const Plan cells = plan();
   for (const int threads : {1, 4}) {

@@ -40,7 +40,8 @@ struct ChunkResult {
   std::vector<Moments> moments;
   std::vector<Real> group_sums;  ///< per channel, of a split ray's chunk
   std::vector<GroupErrors> groups;
-  std::vector<std::uint64_t> lookups;
+  std::vector<BlockErrors> blocks;
+  std::vector<std::uint64_t> lookups, null_collisions;
   std::vector<Real> lookups_squared;
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
@@ -235,6 +236,8 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   Sampled result;
   result.moments.resize(rays * outputs);
   result.lookups.resize(rays);
+  result.null_collisions.resize(rays);
+  result.blocks.resize(outputs);
   result.lookups_squared.resize(rays);
   result.groups.resize(outputs);
 
@@ -296,14 +299,16 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     out.moments.resize((chunk.end_ray - chunk.first_ray) * outputs);
     out.lookups.resize(chunk.end_ray - chunk.first_ray);
     out.lookups_squared.resize(chunk.end_ray - chunk.first_ray);
+    out.null_collisions.resize(chunk.end_ray - chunk.first_ray);
     out.groups.resize(outputs);
+    out.blocks.resize(outputs);
     out.group_sums.assign(outputs, 0);
     const auto begun = Clock::now();
     Evidences evidences(gate, outputs, mine.evidence, out.evidence);
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
       scene.context(ray, kernel, mine.context);
       kernel.begin_ray(*mine.workspace, *scene.medium->medium, scene.medium->extrema, mine.context);
-      const std::uint64_t lookups_before = out.counters.lookups;
+      const std::uint64_t lookups_before = out.counters.lookups, null_collisions_before = out.counters.null_collisions;
       const std::size_t local = ray - chunk.first_ray;
       for (std::uint64_t drawn = 0; drawn < chunk.count && !stopped; drawn += kBatch) {
         if (drawn > 0 && stop()) stopped = true;
@@ -316,7 +321,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
           const Real target = targets.mean[ray * outputs + o];
           const std::span<Real> errors(&mine.errors[o * batch], batch);
           const std::span<const Real> counted = take_errors(mine, o, target, errors, out);
-          out.moments[local * outputs + o].add(counted);
+          out.blocks[o].add(ray, counted, out.moments[local * outputs + o]);
           out.groups[o].add(counted);
         }
         out.lookups_squared[local] += sum_of_squares(mine.block.lookups);
@@ -333,6 +338,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         out.judging += judged_at - counted_at;
       }
       out.lookups[local] = out.counters.lookups - lookups_before;
+      out.null_collisions[local] = out.counters.null_collisions - null_collisions_before;
       for (std::size_t o = 0; o < outputs; ++o) {
         out.group_sums[o] = out.moments[local * outputs + o].s1;
         out.groups[o].finish_ray();
@@ -356,10 +362,12 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
       for (std::size_t o = 0; o < outputs; ++o)
         result.moments[ray * outputs + o] += part.moments[(ray - chunk.first_ray) * outputs + o];
       result.lookups[ray] += part.lookups[ray - chunk.first_ray];
+      result.null_collisions[ray] += part.null_collisions[ray - chunk.first_ray];
       result.lookups_squared[ray] += part.lookups_squared[ray - chunk.first_ray];
     }
     for (std::size_t o = 0; o < outputs; ++o) {
       result.groups[o] += part.groups[o];
+      result.blocks[o] += part.blocks[o];
       if (span.per_ray <= whole_chunk) continue;
       if (chunk.first == 0) across[o].finish_ray();
       if (chunk.count == whole_chunk) across[o].carry(static_cast<std::size_t>(level), part.group_sums[o]);

@@ -13,10 +13,12 @@ namespace nullmark {
 
 /// The statistics of one cell, per ray, in an order that no thread count changes.
 struct Sampled {
-  std::vector<Moments> moments;        ///< [ray * outputs + o], errors around the measured target
-  std::vector<std::uint64_t> lookups;  ///< per ray
-  std::vector<Real> lookups_squared;   ///< per ray, sum over the samples
-  std::vector<GroupErrors> groups;     ///< per output
+  std::vector<Moments> moments;                ///< [ray * outputs + o], errors around the measured target
+  std::vector<std::uint64_t> lookups;          ///< per ray
+  std::vector<Real> lookups_squared;           ///< per ray, sum over the samples
+  std::vector<std::uint64_t> null_collisions;  ///< per ray
+  std::vector<GroupErrors> groups;             ///< per output
+  std::vector<BlockErrors> blocks;             ///< per output
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
   std::vector<Evidence> evidence;  ///< one per test of the gate

@@ -230,6 +230,7 @@ Json cell_schema() {
        {"mean", statistic("average over the rays")},
        {"reference", object_schema({{"value", statistic("average over the rays")},
                                     {"error", statistic("bound on the reference's own error")},
+                                    {"rms", statistic("root mean square over the rays")},
                                     {"method", text}},
                                    {"value", "error", "method"})},
        {"bias", statistic("mean - reference")},
@@ -246,6 +247,9 @@ Json cell_schema() {
        {"rng_draws_per_sample", nullable("number")},
        {"lookups", described(whole(0), "over all samples")},
        {"rng_draws", described(whole(0), "over all samples")},
+       {"squared_error_blocks", described(list_of(nullable("number")),
+                                          "mean squared error of 16 disjoint parts of the samples, cut alike for all "
+                                          "estimators; averaged over channels")},
        {"lookups_variance", described(nullable("number"), "of one sample's lookups, averaged over the rays")},
        {"instructions", described(whole(0), "that drawing all samples took, counted in a simulator")},
        {"majorant_violations", whole(0)},
@@ -309,11 +313,16 @@ Json config_schema() {
             {{"enabled", {{"type", "boolean"}, {"default", TimingPlan{}.enabled}}},
              {"repetitions", {{"type", "integer"}, {"minimum", 1}, {"maximum", 10'000}, {"default", TimingPlan{}.repetitions}}},
              {"seconds", described(positive(), "least time of one repetition")},
-             {"samples_per_traversal", described(whole(1), "samples that share one walk through the majorant structure")}})},
+             {"samples_per_traversal",
+              described({{"anyOf", {whole(1), list_of(whole(1), 1)}}},
+                        "samples that share one walk through the majorant structure; of an ascending list the last is what a "
+                        "cell's time says")}})},
        {"verdict", closed_object({{"alpha", described(positive(), "chance of even one false FAIL in the whole configuration")},
                                   {"alpha_pass", described(positive(), "chance of a false PASS, of each test")}})},
        {"experiments", list_of(reference("experiment"), 1)},
-       {"tables", list_of(reference("table"))}},
+       {"tables", list_of(reference("table"))},
+       {"credits", described({{"type", "object"}, {"additionalProperties", {{"type", "string"}}}},
+                             "author and licence, by a data file's name")}},
       {"$schema", "experiments"}));
   json["definitions"] = definitions();
   return json;

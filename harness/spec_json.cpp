@@ -119,16 +119,18 @@ std::string applied_config(const Plan& plan) {
     if (cell.reference) entry["reference"] = reference_json(*cell.reference);
     experiments.back()["include"].push_back(std::move(entry));
   }
-  const Json json = {{"$schema", kConfigSchema},
-                     {"name", plan.name},
-                     {"timing",
-                      {{"enabled", plan.timing.enabled},
-                       {"repetitions", plan.timing.repetitions},
-                       {"seconds", plan.timing.seconds},
-                       {"samples_per_traversal", plan.timing.samples_per_traversal}}},
-                     {"verdict", {{"alpha", plan.levels.alpha}, {"alpha_pass", plan.levels.alpha_pass}}},
-                     {"experiments", std::move(experiments)},
-                     {"tables", tables_json(plan.tables)}};
+  const std::vector<std::uint64_t>& batches = plan.timing.samples_per_traversal;
+  Json json = {{"$schema", kConfigSchema},
+               {"name", plan.name},
+               {"timing",
+                {{"enabled", plan.timing.enabled},
+                 {"repetitions", plan.timing.repetitions},
+                 {"seconds", plan.timing.seconds},
+                 {"samples_per_traversal", batches.size() == 1 ? Json(batches[0]) : Json(batches)}}},
+               {"verdict", {{"alpha", plan.levels.alpha}, {"alpha_pass", plan.levels.alpha_pass}}},
+               {"experiments", std::move(experiments)},
+               {"tables", tables_json(plan.tables)}};
+  if (!plan.credits.empty()) json["credits"] = plan.credits;
   return json.dump();
 }
 

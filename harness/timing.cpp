@@ -78,6 +78,21 @@ std::size_t voxel_bytes(const Medium& medium) {
   return volume ? volume->data().values.bytes() : 0;
 }
 
+/// Nanoseconds per sample of each repetition.
+std::vector<Real> sample_times(const std::vector<Repetition>& repetitions) {
+  std::vector<Real> ns;
+  for (const Repetition& repetition : repetitions) ns.push_back(repetition.ns_per_iteration / repetition.samples);
+  return ns;
+}
+
+BatchTime batch_time(std::uint64_t samples_per_traversal, const std::vector<Real>& ns) {
+  BatchTime batch{samples_per_traversal, median(ns), 0};
+  std::vector<Real> deviation;
+  for (const Real each : ns) deviation.push_back(std::abs(each - batch.ns_per_sample));
+  batch.mad = median(deviation);
+  return batch;
+}
+
 /// Leaves Google Benchmark altogether: 1.7 aborts when a benchmark is skipped in one of several interleaved repetitions.
 struct Interrupted {};
 
@@ -161,14 +176,17 @@ std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& 
     state.counters["samples"] = static_cast<double>(samples);
     state.counters["lookups"] = static_cast<double>(lookups);
   }));
+  const auto batch_name = [](std::size_t cell, std::uint64_t samples) { return fmt::format("{}/{}", cell, samples); };
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const std::vector<std::size_t> rays = timed_rays(*cells[i].scene->rays);
     if (rays.empty()) continue;
-    configure(benchmark::RegisterBenchmark(std::to_string(i).c_str(), [&cells, &plan, &stop, rays, i](benchmark::State& state) {
-      run_cell(state, cells[i], rays, plan.samples_per_traversal, stop);
-    }));
+    for (const std::uint64_t samples : plan.samples_per_traversal)
+      configure(benchmark::RegisterBenchmark(
+          batch_name(i, samples).c_str(),
+          [&cells, &stop, rays, i, samples](benchmark::State& state) { run_cell(state, cells[i], rays, samples, stop); }));
   }
-  Collector collector(progress, (cells.size() + extra) * static_cast<std::size_t>(plan.repetitions));
+  const std::size_t benches = cells.size() * plan.samples_per_traversal.size() + extra;
+  Collector collector(progress, benches * static_cast<std::size_t>(plan.repetitions));
   try {
     benchmark::RunSpecifiedBenchmarks(&collector);
   } catch (const Interrupted&) {
@@ -182,19 +200,22 @@ std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& 
     return ns.empty() ? 0 : median(ns);
   };
   const Real loop = per_lookup(loop_name);
+  const auto whole = static_cast<std::size_t>(plan.repetitions);
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    const std::vector<Repetition>& repetitions = collector.all[std::to_string(i)];
-    if (repetitions.size() != static_cast<std::size_t>(plan.repetitions)) continue;
+    const std::vector<Repetition>& repetitions = collector.all[batch_name(i, plan.samples_per_traversal.back())];
+    if (repetitions.size() != whole) continue;
     TimeRecord time;
+    time.repetition_ns = sample_times(repetitions);
+    const BatchTime main = batch_time(plan.samples_per_traversal.back(), time.repetition_ns);
+    time.ns_per_sample = main.ns_per_sample;
+    time.mad = main.mad;
+    if (plan.samples_per_traversal.size() > 1)
+      for (const std::uint64_t samples : plan.samples_per_traversal)
+        if (const auto& of_batch = collector.all[batch_name(i, samples)]; of_batch.size() == whole)
+          time.batches.push_back(batch_time(samples, sample_times(of_batch)));
     std::vector<Real> lookup_ns;
-    for (const Repetition& repetition : repetitions) {
-      time.repetition_ns.push_back(repetition.ns_per_iteration / repetition.samples);
+    for (const Repetition& repetition : repetitions)
       if (repetition.lookups > 0) lookup_ns.push_back(repetition.ns_per_iteration / repetition.lookups);
-    }
-    time.ns_per_sample = median(time.repetition_ns);
-    std::vector<Real> deviation;
-    for (const Real ns : time.repetition_ns) deviation.push_back(std::abs(ns - time.ns_per_sample));
-    time.mad = median(deviation);
     if (!lookup_ns.empty()) {
       time.ns_per_lookup = median(lookup_ns);
       const auto ratio = [&](Real to) { return to > 0 ? time.ns_per_lookup / to : 0; };
@@ -204,7 +225,7 @@ std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& 
         time.memory_ratio = ratio(per_lookup(memory_name(bytes)));
     }
     time.repetitions = plan.repetitions;
-    time.samples_per_traversal = plan.samples_per_traversal;
+    time.samples_per_traversal = plan.samples_per_traversal.back();
     result[i] = time;
   }
   return result;

@@ -1,0 +1,430 @@
+#include "harness/report/data.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "harness/cell_names.h"
+#include "harness/comparison.h"
+#include "harness/expectation.h"
+#include "harness/metrics.h"
+#include "harness/names.h"
+#include "harness/provenance.h"
+#include "harness/report/images.h"
+#include "harness/results_json.h"
+#include "harness/scaling.h"
+#include "harness/spec_json.h"
+#include "harness/summary.h"
+#include "harness/transport_json.h"
+#include "harness/verdict_json.h"
+
+namespace nullmark {
+namespace {
+
+using Places = std::map<const CellRecord*, std::size_t>;
+
+Json number(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+Json number(const std::optional<Real>& x) { return x ? number(*x) : Json(nullptr); }
+
+Json interval(const Interval& x) { return {{"value", number(x.value)}, {"low", number(x.low)}, {"high", number(x.high)}}; }
+Json interval(const std::optional<Interval>& x) { return x ? interval(*x) : Json(nullptr); }
+
+Json place(const std::optional<std::size_t>& at) { return at ? Json(*at) : Json(nullptr); }
+
+Json per_output(const CellRecord& record, std::optional<Real> ChannelRecord::*member) {
+  Json list = Json::array();
+  for (const ChannelRecord& channel : record.channel) list.push_back(number(channel.*member));
+  return list;
+}
+
+Json time_json(const CellRecord& record) {
+  if (!record.time) return nullptr;
+  return {{"ns_per_sample", interval(median_interval(record.time->repetition_ns))},
+          {"ns_per_lookup", number(record.time->ns_per_lookup)},
+          {"floor_ratio", number(record.time->floor_ratio)},
+          {"loop_ratio", number(record.time->loop_ratio)}};
+}
+
+Json verdict_json_of(const CellRecord& record) {
+  if (!record.verdict) return nullptr;
+  const VerdictRecord& verdict = *record.verdict;
+  const bool of_itself = verdict.against == "own mean";
+  Real evidence = 0, epsilon = 0;
+  for (const TestRecord& test : verdict.tests) {
+    if (test.channel < 0) continue;
+    evidence = std::max(evidence, test.log_e_fail);
+    if (test.group < 0) epsilon = std::max(epsilon, test.epsilon);
+  }
+  return {{"outcome", to_string(of_itself ? verdict.own_mean : verdict.unbiased)},
+          {"against", verdict.against},
+          {"lookups", to_string(verdict.lookups)},
+          {"laws", to_string(verdict.lawful)},
+          {"as_planned", verdict.planned_undecidable},
+          {"reason", verdict.reason},
+          {"epsilon", number(epsilon)},
+          {"log_e_fail", number(evidence)},
+          {"samples_per_ray", verdict.samples_per_ray}};
+}
+
+Json cost_json(const Contender& contender) {
+  if (!contender.cost) return nullptr;
+  const Cost& cost = *contender.cost;
+  Json seconds = Json::array();
+  for (std::size_t i = 0; i < std::size(kTargets); ++i) {
+    Json entry =
+        contender.seconds[i] ? interval(*contender.seconds[i]) : Json{{"value", nullptr}, {"low", nullptr}, {"high", nullptr}};
+    entry["error"] = kTargets[i];
+    entry["reached"] = contender.seconds[i] && std::isfinite(contender.seconds[i]->value);
+    seconds.push_back(std::move(entry));
+  }
+  return {{"basis", cost.analytic ? "analytic" : "sample"},
+          {"reference", number(cost.reference)},
+          {"variance", interval(cost.variance)},
+          {"variance_x_lookups", interval(cost.variance_x_lookups)},
+          {"variance_x_ns", interval(cost.variance_x_ns)},
+          {"floor", interval(cost.floor)},
+          {"seconds", std::move(seconds)},
+          {"pareto", contender.pareto}};
+}
+
+/// Nanoseconds of one of `samples` samples that share a traversal, and whether just so many were timed.
+std::pair<std::optional<Interval>, bool> sample_time(const CellRecord& record, std::uint64_t samples) {
+  if (!record.time) return {std::nullopt, false};
+  const TimeRecord& time = *record.time;
+  for (const BatchTime& batch : time.batches)
+    if (batch.samples_per_traversal == samples && samples != time.samples_per_traversal)
+      // Median absolute deviation to standard error of a median, for normal scatter.
+      return {relative(batch.ns_per_sample, 1.4826 * 1.2533 * batch.mad / batch.ns_per_sample / std::sqrt(time.repetitions)),
+              true};
+  return {median_interval(time.repetition_ns), samples >= time.samples_per_traversal};
+}
+
+/// Error and variance of means of 1, 2, 4, ... samples as measured, relative to the reference's root mean square; a mean square
+/// over G groups has the relative error sqrt((kurtosis - 1) / G).
+Json convergence_json(const CellRecord& record, const std::optional<Cost>& cost) {
+  if (!cost || record.channel.empty()) return Json::array();
+  Real excess = 0;
+  for (const ChannelRecord& channel : record.channel) excess = std::max(excess, channel.kurtosis.value_or(3) - 3);
+  Json list = Json::array();
+  for (const ConvergenceRecord& step : record.convergence) {
+    Real square = 0, variance = 0;
+    bool known = step.rmse.size() == record.channel.size();
+    for (std::size_t c = 0; known && c < step.rmse.size(); ++c) {
+      known = step.rmse[c] && step.variance[c];
+      if (!known) break;
+      square += *step.rmse[c] * *step.rmse[c] / static_cast<Real>(step.rmse.size());
+      variance += *step.variance[c] / static_cast<Real>(step.rmse.size());
+    }
+    if (!known) continue;
+    const auto n = static_cast<Real>(step.samples);
+    const Real groups = static_cast<Real>(record.rays) * std::floor(static_cast<Real>(record.cell.samples_per_ray) / n);
+    const Real scatter = groups > 0 ? std::sqrt(std::max<Real>(0, 2 + excess / n) / groups) : kInfinity;
+    const auto [ns, measured] = sample_time(record, step.samples);
+    list.push_back({{"samples", step.samples},
+                    {"lookups", number(record.lookups_per_sample ? std::optional(n * *record.lookups_per_sample) : std::nullopt)},
+                    {"seconds", ns ? interval(product(*ns, exactly(n * 1e-9))) : Json(nullptr)},
+                    {"time_measured", measured},
+                    {"rmse", interval(relative(std::sqrt(square) / cost->reference, scatter / 2))},
+                    {"variance", interval(relative(variance, scatter))}});
+  }
+  return list;
+}
+
+std::vector<std::string> output_names(const CellRecord& record) {
+  if (!record.outputs.empty()) return record.outputs;
+  if (record.channels == 1) return {""};
+  std::vector<std::string> names;
+  for (int c = 0; c < record.channels; ++c) names.push_back(fmt::format("channel {}", c));
+  return names;
+}
+
+Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& images, const std::string& file) {
+  const Cell& cell = record.cell;
+  Json parameters = Json::object();
+  for (const auto& [name, value] : numeric_parameters(record)) parameters[name] = number(value);
+  return {{"run", run},
+          {"scene", nullptr},
+          {"id", cell.id},
+          {"name", cell.name},
+          {"experiment", cell.experiment},
+          {"estimator", tracker_label(cell)},
+          {"type", cell.estimator.type},
+          {"claims", record.claims},
+          {"precision", to_string(cell.precision)},
+          {"medium", record.medium.label},
+          {"majorant", record.majorant.label},
+          {"rays", record.ray_set.label},
+          {"quantity", to_string(cell.quantity)},
+          {"light", transport_label(cell.transport)},
+          {"parameters", std::move(parameters)},
+          {"outputs", output_names(record)},
+          {"status", to_string(record.status)},
+          {"reason", record.reason},
+          {"n_rays", record.rays},
+          {"samples_per_ray", cell.samples_per_ray},
+          {"seed", cell.seed},
+          {"mean", per_output(record, &ChannelRecord::mean)},
+          {"reference", per_output(record, &ChannelRecord::reference)},
+          {"bias", per_output(record, &ChannelRecord::bias)},
+          {"rmse", per_output(record, &ChannelRecord::rmse)},
+          {"rmse_theory", per_output(record, &ChannelRecord::rmse_theory)},
+          {"variance", per_output(record, &ChannelRecord::variance)},
+          {"variance_theory", per_output(record, &ChannelRecord::variance_theory)},
+          {"lookups", number(record.lookups_per_sample)},
+          {"lookups_theory", number(record.lookups_theory)},
+          {"null_collisions", number(record.null_collisions_per_sample)},
+          {"draws", number(record.draws_per_sample)},
+          {"time", time_json(record)},
+          {"verdict", verdict_json_of(record)},
+          {"cost", nullptr},
+          {"convergence", Json::array()},
+          {"images", images.add(record, file)}};
+}
+
+const char* word(BreakEven::Kind kind) {
+  switch (kind) {
+    case BreakEven::Kind::never_cheaper:
+      return "never cheaper";
+    case BreakEven::Kind::no_floor_seen:
+      return "no floor seen";
+    case BreakEven::Kind::at:
+      break;
+  }
+  return "at";
+}
+
+Json scene_json(const Contest& contest, const Places& places) {
+  const auto cell = [&](std::size_t contender) { return places.at(contest.contenders[contender].record); };
+  const auto cell_or_null = [&](const std::optional<std::size_t>& contender) {
+    return contender ? Json(cell(*contender)) : Json(nullptr);
+  };
+  Json ranking = Json::array(), break_even = Json::array();
+  for (std::size_t i = 0; i < contest.contenders.size(); ++i) {
+    const Contender& contender = contest.contenders[i];
+    ranking.push_back({{"cell", cell(i)},
+                       {"label", contender.label},
+                       {"rank", place(contender.rank)},
+                       {"tied", contender.tied},
+                       {"relative", interval(contender.relative)}});
+    if (!contender.break_even) continue;
+    const bool at = contender.break_even->kind == BreakEven::Kind::at;
+    break_even.push_back({{"cell", cell(i)},
+                          {"against", cell(*contest.best_unbiased)},
+                          {"kind", word(contender.break_even->kind)},
+                          {"seconds", at ? interval(contender.break_even->seconds) : Json(nullptr)},
+                          {"error", at ? interval(contender.break_even->error) : Json(nullptr)}});
+  }
+  return {{"name", contest.name},
+          {"quantity", contest.quantity},
+          {"medium", contest.medium},
+          {"majorant", contest.majorant},
+          {"rays", contest.rays},
+          {"light", contest.light},
+          {"measurement", contest.measurement},
+          {"baseline", cell_or_null(contest.baseline)},
+          {"best_unbiased", cell_or_null(contest.best_unbiased)},
+          {"ranking", std::move(ranking)},
+          {"break_even", std::move(break_even)}};
+}
+
+template <class T>
+const T* under(const std::vector<std::pair<std::string, T>>& entries, const std::string& heading) {
+  const auto at = std::find_if(entries.begin(), entries.end(), [&](const auto& entry) { return entry.first == heading; });
+  return at == entries.end() ? nullptr : &at->second;
+}
+
+Json table_json(const Table& table, const CellsByName& cells, const Places& places) {
+  std::vector<std::string> given, answered;
+  bool theory = false;
+  const auto note_headings = [](const auto& entries, std::vector<std::string>& headings) {
+    for (const auto& [heading, entry] : entries)
+      if (std::find(headings.begin(), headings.end(), heading) == headings.end()) headings.push_back(heading);
+  };
+  for (const TableRow& row : table.rows) {
+    note_headings(row.given, given);
+    note_headings(row.cells, answered);
+    theory = theory || row.theory_of;
+  }
+  std::vector<std::string> columns = given;
+  columns.insert(columns.end(), answered.begin(), answered.end());
+  if (theory) columns.emplace_back("theory");
+
+  Json rows = Json::array();
+  for (const TableRow& row : table.rows) {
+    Json values = Json::array(), of_cells = Json::array();
+    const auto add = [&](const std::optional<Real>& value, const std::string* cell) {
+      values.push_back(number(value));
+      const auto at = cell ? cells.find(*cell) : cells.end();
+      of_cells.push_back(at == cells.end() ? Json(nullptr) : Json(places.at(at->second)));
+    };
+    for (const std::string& heading : given) {
+      const Real* value = under(row.given, heading);
+      add(value ? std::optional(*value) : std::nullopt, nullptr);
+    }
+    for (const std::string& heading : answered) {
+      const std::string* cell = under(row.cells, heading);
+      add(cell ? row_value(cells, table, row, *cell, metric) : std::nullopt, cell);
+    }
+    if (theory) add(row.theory_of ? row_value(cells, table, row, *row.theory_of, metric_theory) : std::nullopt, nullptr);
+    rows.push_back({{"label", row.label}, {"values", std::move(values)}, {"cells", std::move(of_cells)}, {"note", row.note}});
+  }
+  return {{"title", table.title}, {"metric", table.metric}, {"columns", columns}, {"rows", std::move(rows)}};
+}
+
+Json matrix_json(const std::vector<Contest>& all, const Places& places) {
+  std::vector<std::string> rows;
+  for (const Contest& contest : all)
+    for (const Contender& contender : contest.contenders)
+      if (std::find(rows.begin(), rows.end(), contender.label) == rows.end()) rows.push_back(contender.label);
+  std::sort(rows.begin(), rows.end());
+  Json cells = Json::array(), columns = Json::array();
+  for (std::size_t scene = 0; scene < all.size(); ++scene) columns.push_back({{"scene", scene}, {"label", all[scene].name}});
+  for (const std::string& row : rows) {
+    Json line = Json::array();
+    for (const Contest& contest : all) {
+      const auto at = std::find_if(contest.contenders.begin(), contest.contenders.end(),
+                                   [&](const Contender& contender) { return contender.label == row; });
+      line.push_back(at == contest.contenders.end() ? Json(nullptr) : Json(places.at(at->record)));
+    }
+    cells.push_back(std::move(line));
+  }
+  return {{"rows", rows}, {"columns", std::move(columns)}, {"cells", std::move(cells)}};
+}
+
+Json scaling_json(const std::vector<RunRecord>& runs, const Places& places) {
+  Json list = Json::array();
+  for (const RunRecord& run : runs)
+    for (const ScalingSeries& series : scaling_series(run)) {
+      Json points = Json::array();
+      for (std::size_t i = 0; i < series.cells.size(); ++i) {
+        const CellRecord& record = *series.cells[i];
+        points.push_back({{"x", series.x[i]},
+                          {"cell", places.at(&record)},
+                          {"ns_per_sample", record.time ? interval(median_interval(record.time->repetition_ns)) : Json(nullptr)},
+                          {"lookups", number(record.lookups_per_sample)}});
+      }
+      list.push_back({{"axis", series.axis},
+                      {"estimator", series.tracker},
+                      {"rest", series.rest},
+                      {"points", std::move(points)},
+                      {"exponent", interval(series.time)},
+                      {"exponent_upper", interval(series.time_upper)},
+                      {"exponent_lookups", interval(series.lookups)}});
+    }
+  return list;
+}
+
+std::string base_name(const CellRecord& record) {
+  const auto file = record.medium.field.values.find("file");
+  if (file == record.medium.field.values.end()) return "";
+  const std::string* path = std::get_if<std::string>(&file->second);
+  return path ? std::filesystem::path(*path).filename().string() : "";
+}
+
+/// Who made the volumes that the run shows.
+std::set<std::string> credits(const RunRecord& run) {
+  const Json config = run.config_text.empty() ? Json::object() : Json::parse(run.config_text);
+  std::set<std::string> lines;
+  for (const CellRecord& record : run.cells) {
+    const std::string file = base_name(record);
+    if (file.empty()) continue;
+    const Json given = config.value("credits", Json::object());
+    lines.insert(
+        fmt::format("{}: {}", file, given.contains(file) ? given[file].get<std::string>() : "author and licence not given"));
+  }
+  return lines;
+}
+
+/// The command that made the results, as a shell takes it, but for the folder of the program.
+std::string command_line(const Json& provenance) {
+  std::string line = "nullmark";
+  const Json words = provenance.value("command_line", Json::array());
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    const std::string word = words[i].is_string() ? words[i].get<std::string>() : words[i].dump();
+    const bool plain = !word.empty() && word.find_first_of(" '\"$`\\&|;<>()*?[]{}#~!\n") == std::string::npos;
+    std::string quoted;
+    for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+    line += plain ? " " + word : " '" + quoted + "'";
+  }
+  return line;
+}
+
+Json run_json(RunRecord& run, const std::string& file) {
+  Json provenance = Json::object();
+  for (const auto& [key, text] : run.provenance) provenance[key] = Json::parse(text);
+  const Summary summary = summarise(run);
+  const std::string name = std::filesystem::path(file).filename().string();
+  return {{"name", run.name},
+          {"file", name},
+          {"config_hash", config_hash(run.config_text)},
+          {"commands", {command_line(provenance), "nullmark check " + name, "nullmark compare " + name}},
+          {"provenance", std::move(provenance)},
+          {"verdicts",
+           {{"pass", summary.pass},
+            {"fail", summary.fail},
+            {"expected_open", summary.expected_open},
+            {"unexpected_open", summary.unexpected_open},
+            {"violated", summary.violated},
+            {"errors", summary.errors},
+            {"not_run", summary.not_run},
+            {"unclaimed", summary.unclaimed}}}};
+}
+
+}  // namespace
+
+ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::string>& files, const std::string& baseline,
+                       const std::string& command) {
+  ReportData data;
+  Json& json = data.json;
+  ReportImages images;
+  Places places;
+  std::string title;
+  std::set<std::string> shown;
+  json["runs"] = Json::array();
+  json["cells"] = Json::array();
+  json["tables"] = Json::array();
+  for (std::size_t run = 0; run < runs.size(); ++run) {
+    title += (title.empty() ? "" : " + ") + runs[run].name;
+    json["runs"].push_back(run_json(runs[run], files[run]));
+    shown.merge(credits(runs[run]));
+    for (const CellRecord& record : runs[run].cells) {
+      places[&record] = json["cells"].size();
+      json["cells"].push_back(cell_json_of(record, run, images, files[run]));
+    }
+    const CellsByName cells = cells_by_name(runs[run]);
+    for (const Table& table : runs[run].tables) json["tables"].push_back(table_json(table, cells, places));
+  }
+  const std::vector<Contest> all = contests(runs, baseline);
+  json["scenes"] = Json::array();
+  json["paired"] = Json::array();
+  for (std::size_t scene = 0; scene < all.size(); ++scene) {
+    json["scenes"].push_back(scene_json(all[scene], places));
+    for (const Contender& contender : all[scene].contenders) {
+      Json& cell = json["cells"][places.at(contender.record)];
+      cell["scene"] = scene;
+      cell["cost"] = cost_json(contender);
+      cell["convergence"] = convergence_json(*contender.record, contender.cost);
+    }
+    for (const Pairing& pairing : all[scene].pairings)
+      json["paired"].push_back({{"scene", scene},
+                                {"cell", places.at(all[scene].contenders[pairing.contender].record)},
+                                {"against", places.at(all[scene].contenders[pairing.against].record)},
+                                {"ratio", interval(pairing.ratio)},
+                                {"unpaired", interval(pairing.unpaired)}});
+  }
+  json["title"] = title;
+  json["version"] = version_line();
+  json["command"] = command;
+  json["credits"] = shown;
+  json["matrix"] = matrix_json(all, places);
+  json["scaling"] = scaling_json(runs, places);
+  json["images"] = images.json();
+  for (const auto& [file, reason] : images.missing())
+    data.warnings.push_back(fmt::format("{}: its pictures are left out: {}", file, reason));
+  return data;
+}
+
+}  // namespace nullmark

@@ -1,0 +1,77 @@
+#include "harness/report/figures.h"
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <boost/archive/iterators/binary_from_base64.hpp>
+#include <boost/archive/iterators/transform_width.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+
+#include "harness/file_io.h"
+#include "harness/json_input.h"
+
+namespace nullmark {
+namespace {
+
+std::string from_base64(std::string_view text) {
+  using namespace boost::archive::iterators;
+  using Decoder = transform_width<binary_from_base64<std::string_view::const_iterator>, 8, 6>;
+  while (!text.empty() && text.back() == '=') text.remove_suffix(1);
+  // An incomplete last byte is what the padding stood for.
+  const std::size_t bytes = text.size() * 6 / 8;
+  std::string result;
+  for (Decoder at(text.begin()); result.size() < bytes; ++at) result += *at;
+  return result;
+}
+
+std::string quoted(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) result += c == '\'' ? "'\\''" : std::string(1, c);
+  return result + "'";
+}
+
+std::string find_browser() {
+  for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
+    if (std::system(fmt::format("command -v {} >/dev/null 2>&1", name).c_str()) == 0) return name;
+  throw InputError("--figures: no Chromium is installed, which draws them; expected the package chromium");
+}
+
+/// The page after its scripts have run.
+std::string drawn_page(const std::string& page_file) {
+  const std::string url = "file://" + std::filesystem::absolute(page_file).string() + "?figures=1";
+  // Chromium's sandbox refuses to start as root, as in containers; the page is ours and loads nothing.
+  const std::string command =
+      fmt::format("{} --headless=new {} --disable-gpu --hide-scrollbars --virtual-time-budget=120000 --dump-dom {} 2>/dev/null",
+                  find_browser(), ::geteuid() == 0 ? "--no-sandbox" : "", quoted(url));
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(command.c_str(), "r"), &::pclose);
+  if (!pipe) throw std::runtime_error("Chromium cannot be started");
+  std::string text;
+  std::array<char, 65536> buffer;
+  while (const std::size_t got = std::fread(buffer.data(), 1, buffer.size(), pipe.get())) text.append(buffer.data(), got);
+  return text;
+}
+
+}  // namespace
+
+std::size_t write_figures(const std::string& page_file, const std::string& folder) {
+  const std::string page = drawn_page(page_file);
+  const std::string_view open = "<script type=\"application/json\" id=\"figures\">", close = "</script>";
+  const std::size_t begin = page.find(open), end = page.find(close, begin);
+  if (begin == std::string::npos || end == std::string::npos)
+    throw InputError(fmt::format("--figures: Chromium drew nothing of {}; open it in a browser to see why", page_file));
+  const Json figures = parse_json(page.substr(begin + open.size(), end - begin - open.size()), page_file);
+  std::filesystem::create_directories(folder);
+  for (const Json& figure : figures) {
+    const std::string path = (std::filesystem::path(folder) / figure.at("name").get<std::string>()).string();
+    write_atomically(path + ".svg", figure.at("svg").get<std::string>());
+    write_atomically(path + ".png", from_base64(figure.at("png").get<std::string>()));
+  }
+  return figures.size();
+}
+
+}  // namespace nullmark
