@@ -8,6 +8,7 @@
 #include <cstring>
 #include <iterator>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "media/parameters.h"
@@ -28,11 +29,24 @@ T taken(const std::byte* at) {
   return value;
 }
 
+bool unusable(float value) { return !std::isfinite(value) || value < 0; }
+
+[[noreturn]] void refuse_value(const std::string& where, float value, const FlatHeader& header) {
+  const bool level_set = FlatHeader::kGridClasses[header.grid_class] == std::string_view("level set");
+  throw UnusableGrid(fmt::format("{} {}, expected finite values >= 0 (as 32 bit floats); {}", where, value,
+                                 level_set ? "this is a level set: convert it with openvdb::tools::sdfToFogVolume"
+                                           : "clean the grid, e.g. with openvdb::tools::foreach"));
+}
+
+[[noreturn]] void refuse_voxel(const Index3& at, float value, const FlatHeader& header) {
+  refuse_value(fmt::format("voxel ({}, {}, {}) holds", at[0], at[1], at[2]), value, header);
+}
+
 /// The leaves and tiles of an answer, found by voxel.
 class FlatVoxels {
  public:
   FlatVoxels(std::span<const std::byte> answer, const FlatHeader& header, const IndexBox& box)
-      : leaves_(answer.data() + sizeof(FlatHeader)), leaf_count_(header.leaves), background_(header.background), box_(box) {
+      : header_(header), leaves_(answer.data() + sizeof(FlatHeader)), leaf_count_(header.leaves), box_(box) {
     const std::size_t room = answer.size() - sizeof(FlatHeader);
     if (header.leaves > room / sizeof(FlatLeaf) || header.tiles != (room - header.leaves * sizeof(FlatLeaf)) / sizeof(FlatTile) ||
         (room - header.leaves * sizeof(FlatLeaf)) % sizeof(FlatTile) != 0)
@@ -62,18 +76,26 @@ class FlatVoxels {
       if (tile.side != 8 && tile.side != 128 && tile.side != 4096)
         throw Inconsistent(fmt::format("a tile of {} voxels", tile.side));
       claim({tile.origin[0], tile.origin[1], tile.origin[2]}, tile.side, leaf_count_ + n + 1);
+      // One in a large tile would make every brick of it one of its own.
+      if (unusable(tile.value))
+        refuse_voxel(Index3(tile.origin[0], tile.origin[1], tile.origin[2]).cwiseMax(box_.lo), tile.value, header_);
     }
   }
 
   /// As BrickGrid::build asks for it.
-  void fill(const Index3& origin, float* values) const {
+  bool fill(const Index3& origin, float* values) const {
+    std::array<std::uint32_t, 8> owners{};
+    for (unsigned corner = 0; corner < 8; ++corner)
+      owners[corner] = owner_at(brick_of(origin[0]) + (corner >> 2), brick_of(origin[1]) + (corner >> 1 & 1),
+                                brick_of(origin[2]) + (corner & 1));
+    if (std::all_of(owners.begin(), owners.end(), [](std::uint32_t owner) { return owner == 0; })) return false;
     constexpr int n = BrickGrid::kSide, stride = BrickGrid::kStride;
     for (int corner = 0; corner < 8; ++corner) {
       const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
-      const std::uint32_t owner = owner_at(brick_of(origin[0]) + x, brick_of(origin[1]) + y, brick_of(origin[2]) + z);
+      const std::uint32_t owner = owners[static_cast<std::size_t>(corner)];
       const bool leaf = owner != 0 && owner <= leaf_count_;
       const std::byte* const voxels = leaf ? leaves_ + (owner - 1) * sizeof(FlatLeaf) + offsetof(FlatLeaf, values) : nullptr;
-      const float tile = owner == 0 ? background_
+      const float tile = owner == 0 ? header_.background
                          : leaf     ? 0
                                 : taken<float>(tiles_ + (owner - leaf_count_ - 1) * sizeof(FlatTile) + offsetof(FlatTile, value));
       // The brick itself, or the one layer of its neighbours that is the apron.
@@ -88,6 +110,7 @@ class FlatVoxels {
             std::fill(row, row + wide, tile);
         }
     }
+    return true;
   }
 
  private:
@@ -120,26 +143,14 @@ class FlatVoxels {
         }
   }
 
+  const FlatHeader& header_;
   const std::byte *leaves_, *tiles_ = nullptr;
   std::size_t leaf_count_, tile_count_ = 0;
-  float background_;
   IndexBox box_;
   std::array<std::int64_t, 3> first_{};
   std::array<std::size_t, 3> shape_{};
   std::vector<std::uint32_t> owner_;  ///< 0: background; then leaves, then tiles, counted from 1
 };
-
-void expect_extinction(const BrickGrid& values, bool level_set) {
-  const auto unusable = [](float value) { return !std::isfinite(value) || value < 0; };
-  const char* const expected = "expected finite values >= 0 (as 32 bit floats)";
-  const char* const remedy = level_set ? "this is a level set: convert it with openvdb::tools::sdfToFogVolume"
-                                       : "clean the grid, e.g. with openvdb::tools::foreach";
-  if (unusable(values.background()))
-    throw UnusableGrid(fmt::format("its background is {}, {}; {}", values.background(), expected, remedy));
-  if (const std::optional<Index3> at = values.find(unusable))
-    throw UnusableGrid(fmt::format("voxel ({}, {}, {}) holds {}, {}; {}", (*at)[0], (*at)[1], (*at)[2],
-                                   values.value((*at)[0], (*at)[1], (*at)[2]), expected, remedy));
-}
 
 std::uint64_t content_hash(const BrickGrid& values, const Affine& map) {
   std::uint64_t hash = values.content_hash();
@@ -160,12 +171,13 @@ VolumeData volume(std::span<const std::byte> answer, const FlatHeader& header) {
   data.grid_class = FlatHeader::kGridClasses[header.grid_class];
   data.active_voxels = header.active_voxels;
   data.active = {{header.lo[0], header.lo[1], header.lo[2]}, {header.hi[0], header.hi[1], header.hi[2]}};
+  if (unusable(header.background)) refuse_value("its background is", header.background, header);
   const IndexBox box = data.active.dilated(1);
   FlatVoxels voxels(answer, header, box);
   bool indexed = false;
   try {
     data.values = BrickGrid::build(
-        box, header.background, [&](const Index3& origin, float* values) { voxels.fill(origin, values); },
+        box, header.background, [&](const Index3& origin, float* values) { return voxels.fill(origin, values); },
         [&](std::size_t n, const auto& body) {
           // By now the box has passed BrickGrid's limits.
           if (!indexed) voxels.index();
@@ -175,7 +187,8 @@ VolumeData volume(std::span<const std::byte> answer, const FlatHeader& header) {
   } catch (const std::length_error& error) {
     throw UnusableGrid(fmt::format("{}; crop or resample the grid", error.what()));
   }
-  expect_extinction(data.values, header.grid_class == 1);
+  if (const std::optional<Index3> at = data.values.find(unusable))
+    refuse_voxel(*at, data.values.value((*at)[0], (*at)[1], (*at)[2]), header);
   data.content_hash = content_hash(data.values, data.index_to_world);
   return data;
 }
