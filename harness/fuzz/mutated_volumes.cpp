@@ -90,7 +90,7 @@ int run(int argc, char** argv) {
     longest = std::max(longest, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     const int number = ++counts[what];
     if (argc > 5 && what != "a volume" && what.rfind("refused", 0) != 0 && what.rfind("not a", 0) != 0)
-      std::filesystem::copy_file(file, fmt::format("{}/{}_{}.vdb", argv[5], what.substr(0, 28), number));
+      std::filesystem::copy_file(file, fmt::format("{}/{}, seed {}, {}.vdb", argv[5], what, argv[4], number));
   }
   std::filesystem::remove(file);
   for (const auto& [what, count] : counts) fmt::print("{:6d} {}\n", count, what);
