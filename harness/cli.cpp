@@ -272,6 +272,9 @@ ExitCode guarded(int argc, char** argv) {
     return report(ExitCode::input_error, (error.parameter.empty() ? "" : error.parameter + ": ") + error.what());
   } catch (const std::bad_alloc&) {
     return report(ExitCode::input_error, "not enough memory for what is asked; use fewer rays, cells or grid cells");
+  } catch (const std::system_error& error) {
+    // Of fmt, where the terminal's or the pipe's end is a full disk.
+    return report(ExitCode::internal_error, error.what());
   } catch (const std::exception& error) {
     return report(ExitCode::internal_error, fmt::format("internal error: {}", error.what()));
   }

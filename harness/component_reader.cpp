@@ -73,7 +73,8 @@ std::vector<Place> swept(const Place& place, bool value_is_list) {
 }
 
 template <class Spec, class Value, class Set>
-std::vector<Spec> crossed(const std::vector<Spec>& specs, const std::vector<Value>& values, const Set& set) {
+std::vector<Spec> crossed(const Place& place, const std::vector<Spec>& specs, const std::vector<Value>& values, const Set& set) {
+  expect_cells(place, specs.size(), values.size());
   std::vector<Spec> result;
   for (const Spec& spec : specs)
     for (const Value& value : values) {
@@ -125,7 +126,7 @@ std::vector<Component> read_given(ComponentKind kind, const Place& place, const 
     }
     std::vector<ParameterValue> values;
     for (const Place& value : swept(place[key], holds_list(*parameter))) values.push_back(read_value(*parameter, value));
-    components = crossed(components, values,
+    components = crossed(place, components, values,
                          [&name = key](Component& component, const ParameterValue& value) { component.values[name] = value; });
   }
   return components;
@@ -182,12 +183,12 @@ std::vector<MediumSpec> with_matter(std::vector<MediumSpec> media, const Place& 
   if (place.has("albedo")) {
     std::vector<std::vector<Real>> albedos;
     for (const Place& albedo : swept(place["albedo"], true)) albedos.push_back(read_per_channel(albedo, 1));
-    media = crossed(media, albedos, [](MediumSpec& medium, const std::vector<Real>& albedo) { medium.albedo = albedo; });
+    media = crossed(place, media, albedos, [](MediumSpec& medium, const std::vector<Real>& albedo) { medium.albedo = albedo; });
   }
   if (place.has("anisotropy")) {
     std::vector<Real> cosines;
     for (const Place& g : swept(place["anisotropy"], false)) cosines.push_back(read_anisotropy(g));
-    media = crossed(media, cosines, [](MediumSpec& medium, Real g) { medium.anisotropy = g; });
+    media = crossed(place, media, cosines, [](MediumSpec& medium, Real g) { medium.anisotropy = g; });
   }
   if (!place.has("emission")) return media;
   const Place emission = place["emission"];
@@ -228,8 +229,8 @@ std::vector<MediumSpec> read_given_media(const Place& place) {
       if (!variants[0].albedo.empty() || !variants[0].emission.empty() || variants[0].anisotropy != 0)
         channel.fail(
             fmt::format("\"albedo\", \"anisotropy\" and \"emission\" belong to the whole; expected them beside \"media\""));
-      media =
-          crossed(media, variants, [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
+      media = crossed(place, media, variants,
+                      [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
     }
     return with_matter(media, place);
   }
@@ -237,17 +238,23 @@ std::vector<MediumSpec> read_given_media(const Place& place) {
   std::vector<std::string> keys = kMatterKeys;
   keys.emplace_back("spectrum");
   const std::vector<Component> fields = read_given(ComponentKind::medium, place, keys);
-  media = crossed(media, fields, [](MediumSpec& medium, const Component& field) { medium.field = field; });
+  media = crossed(place, media, fields, [](MediumSpec& medium, const Component& field) { medium.field = field; });
   if (place.json().is_object() && place.has("spectrum")) {
     std::vector<std::vector<Real>> spectra;
     for (const Place& spectrum : swept(place["spectrum"], true))
       spectra.push_back(numbers_within(spectrum, 1, kMaxChannels, Range::non_negative(), ""));
-    media = crossed(media, spectra, [](MediumSpec& medium, const std::vector<Real>& spectrum) { medium.spectrum = spectrum; });
+    media =
+        crossed(place, media, spectra, [](MediumSpec& medium, const std::vector<Real>& spectrum) { medium.spectrum = spectrum; });
   }
   return with_matter(media, place);
 }
 
 }  // namespace
+
+void expect_cells(const Place& place, std::size_t a, std::size_t b) {
+  constexpr std::size_t kMost = 100'000;
+  if (b > 0 && a > kMost / b) place.fail(fmt::format("its sweeps make more than {} cells; split them into several files", kMost));
+}
 
 std::vector<Component> read_components(ComponentKind kind, const Place& place) {
   std::vector<Component> components = read_given(kind, place);

@@ -8,6 +8,9 @@
 
 namespace nullmark {
 
+/// Throws InputError where a x b combinations are more than a plan may have: a few lists in a small file could fill any memory.
+void expect_cells(const Place& place, std::size_t a, std::size_t b);
+
 /// The components that a configuration's entry stands for, complete with defaults and labels: "ratio", {"type": "ratio"}, or with
 /// lists in place of single parameter values, all combinations of them, the first key varying slowest.
 std::vector<Component> read_components(ComponentKind kind, const Place& place);

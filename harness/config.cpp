@@ -279,6 +279,7 @@ void require_complete(const Place& place, const Draft& draft) {
 std::vector<Draft> expand_matrix(const Place& experiment, const Draft& base) {
   std::vector<Draft> drafts = {base};
   for (const Group& group : read_matrix(experiment)) {
+    expect_cells(experiment["matrix"], drafts.size(), group.size());
     std::vector<Draft> next;
     next.reserve(drafts.size() * group.size());
     for (const Draft& draft : drafts)
@@ -345,23 +346,33 @@ class PlanBuilder {
   void add(const Draft& draft) {
     Cell cell = draft.cell;
     cell.estimator = *draft.estimator;
-    cell.medium = index_of(plan_.media, *draft.medium);
+    cell.medium = media_.index_of(plan_.media, *draft.medium);
     plan_.media[cell.medium].optional &= draft.medium->optional;
-    cell.majorant = index_of(plan_.majorants, *draft.majorant);
-    cell.rays = index_of(plan_.ray_sets, *draft.rays);
+    cell.majorant = majorants_.index_of(plan_.majorants, *draft.majorant);
+    cell.rays = ray_sets_.index_of(plan_.ray_sets, *draft.rays);
     plan_.cells.push_back(std::move(cell));
   }
 
  private:
-  template <class Spec>
-  static std::size_t index_of(std::vector<Spec>& list, const Spec& spec) {
-    const auto at = std::find(list.begin(), list.end(), spec);
-    if (at != list.end()) return static_cast<std::size_t>(at - list.begin());
-    list.push_back(spec);
-    return list.size() - 1;
-  }
+  /// Finds among thousands by label, which equal specifications share.
+  class Index {
+   public:
+    template <class Spec>
+    std::size_t index_of(std::vector<Spec>& list, const Spec& spec) {
+      std::vector<std::size_t>& places = of_label_[spec.label];
+      for (const std::size_t place : places)
+        if (list[place] == spec) return place;
+      places.push_back(list.size());
+      list.push_back(spec);
+      return list.size() - 1;
+    }
+
+   private:
+    std::map<std::string, std::vector<std::size_t>> of_label_;
+  };
 
   Plan& plan_;
+  Index media_, majorants_, ray_sets_;
 };
 
 bool same_statistics(const Draft& a, const Draft& b) {
@@ -518,10 +529,15 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
   std::uint64_t own_seed = 1;
   if (top.has("seed")) own_seed = top["seed"].unsigned_integer(0, kAny);
   std::vector<std::string> experiments;
+  std::map<std::vector<std::string>, std::vector<std::size_t>> of_labels;
   for (const Place& entry : top["experiments"].elements()) {
     for (Draft& draft : read_experiment(entry, seed.value_or(own_seed))) {
-      const auto same = [&](const Draft& other) { return same_statistics(draft, other); };
-      if (std::none_of(plan.cells.begin(), plan.cells.end(), same)) plan.cells.push_back(std::move(draft));
+      std::vector<std::size_t>& alike = of_labels[{draft.cell.experiment, draft.estimator->label, draft.medium->label,
+                                                   draft.majorant->label, draft.rays->label}];
+      const auto same = [&](std::size_t other) { return same_statistics(draft, plan.cells[other]); };
+      if (std::any_of(alike.begin(), alike.end(), same)) continue;
+      alike.push_back(plan.cells.size());
+      plan.cells.push_back(std::move(draft));
     }
     const std::string name = entry["name"].string();
     if (std::find(experiments.begin(), experiments.end(), name) != experiments.end())

@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -14,6 +16,9 @@
 #include "harness/json_input.h"
 
 namespace nullmark {
+
+namespace fs = std::filesystem;
+
 namespace {
 
 [[noreturn]] void fail(const std::string& path, const char* action) {
@@ -21,8 +26,17 @@ namespace {
                                std::strerror(errno)));
 }
 
+constexpr const char* kTemporary = ".tmp";
+
+/// Where the path leads: links to results stay links.
+fs::path target_of(const std::string& path) {
+  std::error_code error;
+  const fs::path target = fs::canonical(path, error);
+  return error ? fs::path(path) : target;
+}
+
 /// A renamed file survives a power cut only once its directory has reached the disk.
-void sync_directory(const std::filesystem::path& directory) {
+void sync_directory(const fs::path& directory) {
   const int file = ::open(directory.empty() ? "." : directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (file < 0) return;
   ::fsync(file);
@@ -33,7 +47,7 @@ void sync_directory(const std::filesystem::path& directory) {
 
 std::string read_file(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
-  if (!in || std::filesystem::is_directory(path)) throw InputError(path + ": cannot be read; expected a file");
+  if (!in || fs::is_directory(path)) throw InputError(path + ": cannot be read; expected a file");
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
@@ -49,7 +63,9 @@ void write_durably(int file, const std::string& text, const std::string& path) {
 }
 
 void write_atomically(const std::string& path, const std::string& text) {
-  const std::string temporary = fmt::format("{}.{}.tmp", path, ::getpid());
+  expect_replaceable(path);
+  const fs::path target = target_of(path);
+  const std::string temporary = fmt::format("{}.{}{}", target.string(), ::getpid(), kTemporary);
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file < 0) fail(path, "written");
   try {
@@ -60,11 +76,33 @@ void write_atomically(const std::string& path, const std::string& text) {
     throw;
   }
   ::close(file);
-  if (std::rename(temporary.c_str(), path.c_str()) != 0) {
+  if (std::rename(temporary.c_str(), target.c_str()) != 0) {
     ::unlink(temporary.c_str());
     fail(path, "written");
   }
-  sync_directory(std::filesystem::path(path).parent_path());
+  sync_directory(target.parent_path());
+}
+
+void expect_replaceable(const std::string& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::exists(status) && !fs::is_regular_file(status))
+    throw InputError(path + ": is no regular file; expected the path of a file, or - for standard output");
+}
+
+void remove_leftovers(const std::string& path) {
+  const fs::path target = target_of(path);
+  const std::string prefix = target.filename().string() + ".";
+  std::error_code error;
+  for (const fs::directory_entry& entry :
+       fs::directory_iterator(target.has_parent_path() ? target.parent_path() : fs::path("."), error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.rfind(prefix, 0) != 0 || entry.path().extension() != kTemporary) continue;
+    pid_t owner = 0;
+    const char* const end = name.data() + name.size() - std::strlen(kTemporary);
+    if (std::from_chars(name.data() + prefix.size(), end, owner).ptr != end || owner <= 0) continue;
+    if (::kill(owner, 0) != 0 && errno == ESRCH) fs::remove(entry.path(), error);
+  }
 }
 
 }  // namespace nullmark

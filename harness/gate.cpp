@@ -94,7 +94,8 @@ void set_bets(MeanTest& test, const Pool& pool, Real low, Real high, bool analyt
 
   // Sums may be as long as a bet at its highest rate still resembles the product over single errors.
   constexpr Real kSmall = 0.5;
-  for (const auto& [role, bet] : test.bets) {
+  for (const auto& placed : test.bets) {
+    const Bet& bet = placed.second;
     const Real rate = bet.rates.back();
     const auto fits = [&](int b) {
       if (bet.kind == Kind::catoni) return b * rate * rate * bet.variance <= kSmall * kSmall;

@@ -41,6 +41,8 @@ void write_png(const std::string& path, int width, int height, int channels, con
   spng_set_ihdr(context.get(), &header);
   if (const int error = spng_encode_image(context.get(), pixels.data(), pixels.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE))
     throw std::runtime_error(path + ": " + spng_strerror(error));
+  // A full disk may show only here.
+  if (std::fflush(file.get()) != 0) throw std::runtime_error(path + ": cannot be written");
 }
 
 void write_exr(const std::string& path, int width, int height, const std::vector<Layer>& layers) {

@@ -28,8 +28,10 @@ bool still_there(int file, const std::string& path) {
 }  // namespace
 
 Journal::Journal(const std::string& results_path, const std::string& config_hash, Mode mode) : path_(path_for(results_path)) {
+  expect_replaceable(results_path);
   lock();
   try {
+    remove_leftovers(results_path);
     read(config_hash, mode);
   } catch (...) {
     ::close(file_);

@@ -105,8 +105,13 @@ Json parse_json(const std::string& text, const std::string& file) {
   const char* const begin = text.data();
   const char* seen = begin;
   const auto offset = [&] { return static_cast<std::size_t>(seen - begin); };
+  // What writes and shows values calls itself for each level.
+  constexpr int kDeepest = 100;
   std::vector<std::set<std::string>> keys;
-  const auto callback = [&](int, Json::parse_event_t event, Json& parsed) {
+  const auto callback = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    if (depth > kDeepest)
+      throw InputError(fmt::format("{}: lists and objects are nested more than {} deep",
+                                   position(file, text, std::max<std::size_t>(offset(), 1) - 1), kDeepest));
     if (event == Json::parse_event_t::object_start) keys.emplace_back();
     if (event == Json::parse_event_t::object_end) keys.pop_back();
     if (event == Json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second) {

@@ -61,6 +61,7 @@ std::shared_ptr<const Medium> volume() {
         for (int i = 0; i <= 8; ++i)
           for (int j = 0; j <= 8; ++j)
             for (int k = 0; k <= 8; ++k) *out++ = std::max(0.f, value(at[0] + i, at[1] + j, at[2] + k));
+        return true;
       },
       [](std::size_t n, const auto& body) {
         for (std::size_t i = 0; i < n; ++i) body(i);

@@ -100,6 +100,15 @@ TEST_F(Plugin, ExampleKeepsItsClaimsAndServesEveryCommand) {
   }
 }
 
+/// A volume is read by the plug-in's own executable over again.
+TEST_F(Plugin, ExampleReadsVolumes) {
+  ASSERT_EQ(run(example() + "make-volume v.vdb --resolution 16"), 0) << read("err");
+  write("v.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"v","rays":"single",
+      "samples_per_ray":100,"matrix":{"estimator":["ratio","roulette_ratio"],"medium":{"type":"vdb","file":"v.vdb"}}}]})");
+  ASSERT_EQ(run(example() + "run v.json -o r.json"), 0) << read("err");
+  for (const CellRecord& record : results("r.json").cells) EXPECT_EQ(record.status, Status::ok) << record.reason;
+}
+
 /// A bias of 2 % is 25 standard errors here, so another seed every time misses nothing.
 TEST_F(Plugin, LiesAreBiasedAndFoundOut) {
   const bool check = has_check();

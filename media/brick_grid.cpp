@@ -1,5 +1,7 @@
 #include "media/brick_grid.h"
 
+#include <unistd.h>
+
 #include <bit>
 
 namespace nullmark {
@@ -56,6 +58,11 @@ void BrickGrid::allocate(std::int64_t bricks) {
   if (bytes > kMaxValueBytes)
     throw std::length_error("voxel values of " + std::to_string(bytes >> 20) + " MiB exceed the limit of " +
                             std::to_string(kMaxValueBytes >> 20) + " MiB");
+  // Beyond it the system would end the program, here or later, without a word.
+  const std::int64_t machine = std::int64_t{::sysconf(_SC_PHYS_PAGES)} * ::sysconf(_SC_PAGESIZE);
+  if (bytes > machine)
+    throw std::length_error("voxel values of " + std::to_string(bytes >> 20) + " MiB exceed this machine's memory of " +
+                            std::to_string(machine >> 20) + " MiB");
   values_.resize(static_cast<std::size_t>(bricks) * kBrickValues);
   summaries_.resize(static_cast<std::size_t>(bricks));
 }

@@ -68,7 +68,8 @@ class BrickGrid {
   /// One background value everywhere.
   explicit BrickGrid(float background = 0) : background_(background) {}
 
-  /// `fill(origin, values)` writes the voxels origin + (i, j, k), 0 <= i, j, k <= 8, to values[(i * 9 + j) * 9 + k];
+  /// `fill(origin, values)` writes the voxels origin + (i, j, k), 0 <= i, j, k <= 8, to values[(i * 9 + j) * 9 + k], or returns
+  /// false where all of them are background, which saves most of the time where few voxels span a large box;
   /// `for_each(n, body)` calls body(0) ... body(n - 1), in any order or concurrently.  Throws std::length_error, before
   /// allocating, where the box or its values exceed the limits above.
   template <class Fill, class ForEach>
@@ -216,8 +217,9 @@ BrickGrid BrickGrid::build(const IndexBox& box, float background, const Fill& fi
   using Values = std::array<float, kBrickValues>;
   const auto load = [&](std::size_t b, Values& values) {
     const Index3 at = grid.origin(b);
-    fill(at, values.data());
+    if (!fill(at, values.data())) return false;
     grid.clear_outside(at, values.data());
+    return true;
   };
 
   // First pass: the one value of each brick, or NaN.  Counting before storing allocates exactly once.
@@ -225,7 +227,10 @@ BrickGrid BrickGrid::build(const IndexBox& box, float background, const Fill& fi
   std::vector<float> uniform(grid.table_.size());
   for_each(uniform.size(), [&](std::size_t b) {
     Values values;
-    load(b, values);
+    if (!load(b, values)) {
+      uniform[b] = background;
+      return;
+    }
     const bool same = std::all_of(values.begin(), values.end(), [&](float v) { return v == values[0]; });
     uniform[b] = same ? values[0] : kVaried;
   });
@@ -244,7 +249,7 @@ BrickGrid BrickGrid::build(const IndexBox& box, float background, const Fill& fi
   for_each(uniform.size(), [&](std::size_t b) {
     if (!std::isnan(uniform[b])) return;
     Values values;
-    load(b, values);
+    if (!load(b, values)) values.fill(background);
     grid.store(grid.table_[b], values.data());
   });
   return grid;

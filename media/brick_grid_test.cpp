@@ -20,6 +20,7 @@ BrickGrid make(const IndexBox& box, float background, const Voxels& voxels) {
     for (int i = 0; i <= 8; ++i)
       for (int j = 0; j <= 8; ++j)
         for (int k = 0; k <= 8; ++k) *values++ = voxels(origin[0] + i, origin[1] + j, origin[2] + k);
+    return true;
   };
   return BrickGrid::build(box, background, fill, serial);
 }

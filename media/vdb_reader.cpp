@@ -1,202 +1,224 @@
 #include "media/vdb_reader.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
-#include <openvdb/io/File.h>
-#include <openvdb/io/GridDescriptor.h>
-#include <openvdb/openvdb.h>
-#include <tbb/parallel_for.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
-#include <Eigen/LU>
-#include <bit>
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
-#include <optional>
+#include <string_view>
 
+#include "media/flat_volume.h"
 #include "media/registry.h"
+#include "media/vdb_process.h"
+
+// Damaged files crash OpenVDB or have it loop, so a process of their own reads them.  It is this executable over again, whatever
+// that is - the program, a plug-in, tests, benchmarks - with words that no command line has: an initialiser in this file answers
+// them before main() begins, so that wherever read_vdb is linked, so is its other half, without a hook in anybody's main() and
+// without a second executable to be installed and found.  A fork alone would not do: other threads may hold OpenVDB's or TBB's
+// locks.
 
 namespace nullmark {
-
 namespace {
 
-struct GridEntry {
-  std::string name;  ///< with [n] where names repeat
-  std::string base;
+constexpr const char* kCommand = "nullmark:read-volume";
+/// Where the reader finds the file it answers into.
+constexpr int kAnswer = 3;
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#elif defined(__has_feature)
+constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
+#else
+constexpr bool kSanitized = false;
+#endif
+
+struct Limits {
+  std::uint64_t cpu_seconds, wall_seconds, bytes;
 };
 
-/// The grids a file announces, in file order.  OpenVDB's own reader leaves zeros where a file was cut short, without an error;
-/// so the announced ends are held against the file's size here.
-class Directory : private openvdb::io::Archive {
- public:
-  explicit Directory(const std::string& file) {
-    std::ifstream stream(file, std::ios::binary);
-    stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
-    readHeader(stream);
-    if (!inputHasGridOffsets())
-      throw std::runtime_error("written to a stream, without grid offsets; write it to a file with openvdb::io::File");
-    setFormatVersion(stream);
-    setLibraryVersion(stream);
-    openvdb::MetaMap().readMeta(stream);
-    const auto size = static_cast<std::int64_t>(std::filesystem::file_size(file));
-    for (int n = readGridCount(stream); n > 0; --n) {
-      openvdb::io::GridDescriptor descriptor;
-      descriptor.read(stream);
-      grids_.push_back({openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName()), descriptor.gridName()});
-      if (descriptor.getEndPos() > size)
-        throw std::runtime_error(fmt::format("truncated: {} bytes, but grid \"{}\" ends at {}; copy it again", size,
-                                             grids_.back().name, descriptor.getEndPos()));
-      descriptor.seekToEnd(stream);
-    }
-  }
+/// A megabyte takes a hundredth of a second on a machine of today.  A tree in memory is at most 33 times its file: the sparsest
+/// nodes have two bits of masks in the file for every eight bytes of memory.
+Limits limits_of(std::uint64_t file_size) {
+  const std::uint64_t cpu = 3 + file_size / 1'000'000;
+  const auto machine = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::getpagesize());
+  constexpr std::uint64_t kLeast = std::uint64_t{1} << 30;
+  return {cpu, 60 + 10 * cpu, std::min(machine, kLeast + 64 * std::min(file_size, machine))};
+}
 
-  const std::vector<GridEntry>& grids() const { return grids_; }
+void limit(decltype(RLIMIT_CPU) resource, std::uint64_t value) {
+  rlimit now{};
+  ::getrlimit(resource, &now);
+  now.rlim_cur = std::min<rlim_t>(value, now.rlim_max);
+  ::setrlimit(resource, &now);
+}
+
+/// Address space in use, in bytes.
+std::uint64_t mapped() {
+  std::uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  return pages * static_cast<std::uint64_t>(::getpagesize());
+}
+
+std::uint64_t number(const char* text) {
+  std::uint64_t value = 0;
+  std::from_chars(text, text + std::strlen(text), value);
+  return value;
+}
+
+[[noreturn]] void serve(const char* file, const char* grid, const Limits& limits) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  limit(RLIMIT_CORE, 0);
+  limit(RLIMIT_CPU, limits.cpu_seconds);
+  ::alarm(static_cast<unsigned>(limits.wall_seconds));
+  // Sanitizers map terabytes of their own.
+  if (!kSanitized) limit(RLIMIT_AS, mapped() + limits.bytes);
+  ::_exit(answer_volume(file, grid, kAnswer) ? 0 : 1);
+}
+
+/// The C library hands initialisers what it hands main().
+[[gnu::constructor]] void serve_if_asked(int argc, char** argv, char**) {
+  if (argc == 7 && std::string_view(argv[1]) == kCommand)
+    serve(argv[2], argv[3], {number(argv[4]), number(argv[5]), number(argv[6])});
+}
+
+/// Memory that another process fills as a file; read-only here.
+class Answer {
+ public:
+  Answer() : file_(::memfd_create("nullmark-volume", MFD_CLOEXEC)) {}
+  ~Answer() {
+    if (data_) ::munmap(data_, size_);
+    if (file_ >= 0) ::close(file_);
+  }
+  Answer(const Answer&) = delete;
+  Answer& operator=(const Answer&) = delete;
+
+  int file() const { return file_; }
+
+  /// To be called once nobody writes any more.
+  std::span<const std::byte> bytes() {
+    struct stat status {};
+    if (::fstat(file_, &status) != 0 || status.st_size == 0) return {};
+    size_ = static_cast<std::size_t>(status.st_size);
+    void* const data = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, file_, 0);
+    if (data == MAP_FAILED) throw std::bad_alloc();
+    data_ = data;
+    return {static_cast<const std::byte*>(data_), size_};
+  }
 
  private:
-  std::vector<GridEntry> grids_;
+  int file_;
+  void* data_ = nullptr;
+  std::size_t size_ = 0;
 };
 
-std::string joined(const std::vector<std::string>& names, const char* last) {
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : i + 1 < names.size() ? ", " : last) + names[i];
-  return text;
+/// Where this executable lies; once a newer one has taken that place, the one that runs.
+std::string own_path() {
+  const char* const running = "/proc/self/exe";
+  std::error_code error;
+  const std::string named = std::filesystem::read_symlink(running, error).string();
+  return !error && ::access(named.c_str(), X_OK) == 0 ? named : running;
 }
 
-/// One line naming file and grid.
-struct Source {
-  const std::string& file;
-  const std::string& grid;
+/// The error number of the start, or 0 and how the process ended.
+int run_reader(const std::string& file, const std::string& grid, const Limits& limits, int answer, int& status) {
+  posix_spawn_file_actions_t files;
+  ::posix_spawn_file_actions_init(&files);
+  ::posix_spawn_file_actions_adddup2(&files, answer, kAnswer);
+  // What libraries print when they give up would stand between this program's lines.
+  ::posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  ::posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  ::posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
 
-  [[noreturn]] void refuse(const std::string& message) const {
-    throw ParameterError("grid", fmt::format("{}: grid \"{}\": {}", file, grid, message));
+  // The limits work by signals; what asks the parent to end is for the parent alone.
+  posix_spawnattr_t attributes;
+  ::posix_spawnattr_init(&attributes);
+  sigset_t blocked, defaults;
+  sigemptyset(&blocked);
+  sigaddset(&blocked, SIGINT);
+  sigaddset(&blocked, SIGTERM);
+  sigemptyset(&defaults);
+  for (const int signal : {SIGXCPU, SIGALRM, SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL}) sigaddset(&defaults, signal);
+  ::posix_spawnattr_setsigmask(&attributes, &blocked);
+  ::posix_spawnattr_setsigdefault(&attributes, &defaults);
+  ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+
+  const std::string path = own_path();
+  std::array<std::string, 7> words{path,
+                                   kCommand,
+                                   file,
+                                   grid,
+                                   std::to_string(limits.cpu_seconds),
+                                   std::to_string(limits.wall_seconds),
+                                   std::to_string(limits.bytes)};
+  std::array<char*, 8> arguments{};
+  std::transform(words.begin(), words.end(), arguments.begin(), [](std::string& word) { return word.data(); });
+  pid_t child = 0;
+  const int error = ::posix_spawn(&child, path.c_str(), &files, &attributes, arguments.data(), environ);
+  ::posix_spawnattr_destroy(&attributes);
+  ::posix_spawn_file_actions_destroy(&files);
+  if (error != 0) return error;
+  // Where nobody keeps children's ends (SIGCHLD ignored) the answer alone has to tell.
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-};
+  return 0;
+}
 
-std::string choose(const Source& source, const std::vector<GridEntry>& grids) {
-  std::vector<std::string> all, same;
-  for (const GridEntry& entry : grids) {
-    if (entry.name == source.grid) return entry.name;
-    all.push_back(entry.name);
-    if (entry.base == source.grid) same.push_back(entry.name);
+/// Why there is no answer; empty where there is one.
+std::string failure(int status, const Limits& limits) {
+  if (WIFSIGNALED(status)) {
+    const int signal = WTERMSIG(status);
+    if (signal == SIGXCPU)
+      return fmt::format("the OpenVDB reader worked on it for {} s without an end; the file is damaged, copy it again",
+                         limits.cpu_seconds);
+    if (signal == SIGALRM)
+      return fmt::format("the OpenVDB reader did not finish in {} s; copy the file to a faster disk, or copy it again",
+                         limits.wall_seconds);
+    if (signal == SIGKILL)
+      return "the OpenVDB reader was killed (signal 9), perhaps for want of memory; free some, or resample the grid";
+    return fmt::format("the OpenVDB reader crashed on it (signal {}, {}); the file is damaged, copy it again", signal,
+                       ::strsignal(signal));
   }
-  if (same.size() == 1) return same[0];
-  if (same.size() > 1) source.refuse(fmt::format("appears {} times; choose {}", same.size(), joined(same, " or ")));
-  if (all.empty()) source.refuse("not found, the file has no grids");
-  source.refuse(fmt::format("not found; the file has {}", joined(all, " and ")));
-}
-
-Affine affine(const Source& source, const openvdb::math::Transform& transform) {
-  if (!transform.isLinear())
-    source.refuse(
-        fmt::format("its transform is a {}, expected an affine map; resample it, e.g. with "
-                    "openvdb::tools::resampleToMatch",
-                    transform.mapType()));
-  // OpenVDB multiplies rows: world = index * matrix.
-  const openvdb::Mat4d matrix = transform.baseMap()->getAffineMap()->getMat4();
-  Affine map;
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) map(row, column) = matrix(column, row);
-  const Vec3 edges = map.linear().colwise().norm();
-  // A parallelepiped of less than 1e-9 of its edges' product has no accurate inverse.
-  if (!map.matrix().allFinite() || !(std::abs(map.linear().determinant()) > 1e-9 * edges.prod()))
-    source.refuse(
-        "its transform is singular or not finite, so that world points have no voxel; expected an invertible affine map");
-  return map;
-}
-
-template <class Grid>
-void copy_brick(const Grid& grid, const Index3& origin, float* values) {
-  using Tree = typename Grid::TreeType;
-  using Leaf = typename Tree::LeafNodeType;
-  static_assert(Leaf::DIM == BrickGrid::kSide);
-  // Unregistered with the tree, so that making one for each brick costs nothing.
-  const openvdb::tree::ValueAccessor<const Tree, false> accessor(grid.tree());
-  constexpr int n = BrickGrid::kSide, stride = BrickGrid::kStride;
-  for (int corner = 0; corner < 8; ++corner) {
-    const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
-    const openvdb::Coord at(origin[0] + n * x, origin[1] + n * y, origin[2] + n * z);
-    const Leaf* leaf = accessor.probeConstLeaf(at);
-    const auto tile = leaf ? typename Grid::ValueType{} : accessor.getValue(at);
-    // The brick itself, or the one layer of its neighbours that is the apron.
-    for (int i = 0; i < (x ? 1 : n); ++i)
-      for (int j = 0; j < (y ? 1 : n); ++j)
-        for (int k = 0; k < (z ? 1 : n); ++k) {
-          const auto value = leaf ? leaf->getValue(static_cast<openvdb::Index>((i * n + j) * n + k)) : tile;
-          values[((i + n * x) * stride + j + n * y) * stride + k + n * z] = static_cast<float>(value);
-        }
-  }
-}
-
-void check_values(const Source& source, const BrickGrid& values, bool level_set) {
-  const auto unusable = [](float value) { return !std::isfinite(value) || value < 0; };
-  const char* const expected = "expected finite values >= 0 (as 32 bit floats)";
-  const char* const remedy = level_set ? "this is a level set: convert it with openvdb::tools::sdfToFogVolume"
-                                       : "clean the grid, e.g. with openvdb::tools::foreach";
-  if (unusable(values.background()))
-    source.refuse(fmt::format("its background is {}, {}; {}", values.background(), expected, remedy));
-  if (const std::optional<Index3> at = values.find(unusable))
-    source.refuse(fmt::format("voxel ({}, {}, {}) holds {}, {}; {}", (*at)[0], (*at)[1], (*at)[2],
-                              values.value((*at)[0], (*at)[1], (*at)[2]), expected, remedy));
-}
-
-std::uint64_t content_hash(const BrickGrid& values, const Affine& map) {
-  std::uint64_t hash = values.content_hash();
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) hash = hash_mixed(hash, std::bit_cast<std::uint64_t>(map(row, column)));
-  return hash;
-}
-
-template <class Grid>
-VolumeData convert(const Source& source, const Grid& grid) {
-  VolumeData data;
-  data.index_to_world = affine(source, grid.transform());
-  data.voxel_size = data.index_to_world.linear().colwise().norm();
-  data.grid_class = openvdb::GridBase::gridClassToString(grid.getGridClass());
-  data.active_voxels = static_cast<std::int64_t>(grid.activeVoxelCount());
-  if (data.active_voxels == 0) source.refuse("empty, 0 active voxels; expected at least one: choose another grid or frame");
-
-  const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
-  data.active = {{box.min()[0], box.min()[1], box.min()[2]}, {box.max()[0], box.max()[1], box.max()[2]}};
-  try {
-    data.values = BrickGrid::build(
-        data.active.dilated(1), static_cast<float>(grid.background()),
-        [&](const Index3& origin, float* values) { copy_brick(grid, origin, values); },
-        [](std::size_t n, const auto& body) { tbb::parallel_for(std::size_t{0}, n, body); });
-  } catch (const std::length_error& error) {
-    source.refuse(fmt::format("{}; crop or resample the grid", error.what()));
-  }
-  check_values(source, data.values, grid.getGridClass() == openvdb::GRID_LEVEL_SET);
-  data.content_hash = content_hash(data.values, data.index_to_world);
-  return data;
+  if (WEXITSTATUS(status) != 0)
+    return "the OpenVDB reader could not hand over what it read, perhaps for want of memory; free some";
+  return "";
 }
 
 }  // namespace
 
 VolumeData read_vdb(const std::string& file, const std::string& grid) {
-  static std::once_flag initialized;
-  std::call_once(initialized, openvdb::initialize);
   if (file.empty()) throw ParameterError("file", "no file given; expected the path of an OpenVDB file");
-  std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) throw MissingData(fmt::format("{}: no such file (grid \"{}\")", file, grid));
-  const Source source{file, grid};
-  openvdb::GridBase::Ptr found;
-  try {
-    const std::string name = choose(source, Directory(file).grids());
-    openvdb::io::File archive(file);
-    archive.open(false);
-    const openvdb::GridBase::Ptr header = archive.readGridMetadata(name);
-    if (!header->isType<openvdb::FloatGrid>() && !header->isType<openvdb::DoubleGrid>())
-      source.refuse(
-          fmt::format("holds {} ({}), expected float or double; choose a scalar grid", header->valueType(), header->type()));
-    affine(source, header->transform());
-    found = archive.readGrid(name);
-  } catch (const ParameterError&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw ParameterError("file", fmt::format("{}: grid \"{}\": not a readable OpenVDB file ({}); expected a .vdb file, complete",
-                                             file, grid, error.what()));
-  }
-  if (const auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(found)) return convert(source, *floats);
-  return convert(source, *openvdb::gridPtrCast<openvdb::DoubleGrid>(found));
+  const auto refuse = [&](const std::string& message) {
+    throw ParameterError("file", fmt::format("{}: grid \"{}\": {}", file, grid, message));
+  };
+  std::error_code error;
+  const std::filesystem::file_status found = std::filesystem::status(file, error);
+  if (!std::filesystem::exists(found)) throw MissingData(fmt::format("{}: no such file (grid \"{}\")", file, grid));
+  // A pipe or a device would keep its reader waiting.
+  if (!std::filesystem::is_regular_file(found)) refuse("not a regular file; expected the path of an OpenVDB file");
+  const std::uint64_t size = std::filesystem::file_size(file, error);
+  if (error) refuse(error.message());
+
+  const Limits limits = limits_of(size);
+  Answer answer;
+  if (answer.file() < 0) refuse(fmt::format("no memory to read it into: {}", std::strerror(errno)));
+  int status = 0;
+  if (const int number = run_reader(file, grid, limits, answer.file(), status))
+    refuse(fmt::format("its reader, this program again, cannot be started: {}; is /proc mounted?", std::strerror(number)));
+  if (const std::string why = failure(status, limits); !why.empty()) refuse(why);
+  return unflatten(answer.bytes(), file, grid);
 }
 
 }  // namespace nullmark

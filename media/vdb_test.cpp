@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -9,6 +10,7 @@
 #include <fstream>
 #include <numbers>
 #include <random>
+#include <thread>
 #include <tuple>
 
 #include "media/vdb_writer.h"
@@ -358,6 +360,52 @@ TEST_F(Vdb, RefusesFilesThatAreCutOrForeignAndReportsMissingOnes) {
   expect_refused(folder_.string(), "density", "file", {});
   EXPECT_THROW(read_vdb(path("absent.vdb"), "density"), MissingData);
   EXPECT_THROW(read_vdb("", "density"), ParameterError);
+}
+
+TEST_F(Vdb, SizesThatNoFileOfItsSizeNeedsMeetTheLimitOfMemory) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the limit is on addresses, of which sanitizers take all";
+#endif
+  const std::string file = written(cloud(Coord(0), Coord(9)));
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  in.close();
+  // The length of the grid's name, as the file declares it.
+  const std::size_t name = bytes.find("density");
+  ASSERT_NE(name, std::string::npos);
+  const std::uint32_t huge = 0xfffffff0;
+  std::memcpy(bytes.data() + name - sizeof huge, &huge, sizeof huge);
+  std::ofstream(file, std::ios::binary | std::ios::trunc) << bytes;
+  expect_refused(file, "density", "file", {"more memory", "damaged"});
+}
+
+TEST_F(Vdb, WhatIsNoFileIsNotOpened) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0666), 0);
+  expect_refused(path("pipe"), "density", "file", {"not a regular file"});
+  expect_refused("/dev/zero", "density", "file", {"not a regular file"});
+}
+
+TEST_F(Vdb, NamesInFilesAreShownAsPlainText) {
+  auto grid = cloud(Coord(0), Coord(3));
+  grid->setName("two\nlines\x1b[31m\xff");
+  expect_refused(written(grid), "density", "grid", {"the file has two?lines?[31m?"});
+}
+
+TEST_F(Vdb, ManyAtOnce) {
+  const auto grid = cloud(Coord(-9), Coord(9));
+  const std::string file = written(grid);
+  const std::uint64_t expected = read_vdb(file, "density").content_hash;
+  std::vector<std::thread> threads;
+  for (int n = 0; n < 8; ++n)
+    threads.emplace_back([&] { EXPECT_EQ(read_vdb(file, "density").content_hash, expected); });
+  for (std::thread& thread : threads) thread.join();
+}
+
+// Files that OpenVDB 10 crashes on, and one that it loops on.
+TEST_F(Vdb, ReadersThatCrashOrLoopAreAnError) {
+  for (const auto& [file, words] : std::vector<std::pair<const char*, const char*>>{
+           {"crash.vdb", "crashed on it (signal 11"}, {"loop.vdb", "worked on it for 3 s without an end"}})
+    expect_refused(std::string(NULLMARK_SOURCE_DIR "/media/damaged/") + file, "density", "file", {words, "damaged"});
 }
 
 TEST_F(Vdb, FootprintReachesTheNextVoxel) {
