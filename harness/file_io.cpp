@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <boost/iostreams/device/array.hpp>
+#include <boost/iostreams/filter/gzip.hpp>
+#include <boost/iostreams/filtering_stream.hpp>
 #include <cerrno>
 #include <charconv>
 #include <csignal>
@@ -12,6 +15,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <vector>
 
 #include "harness/json_input.h"
 
@@ -43,12 +47,36 @@ void sync_directory(const fs::path& directory) {
   ::close(file);
 }
 
+std::string unpacked(const std::string& packed, const std::string& path) {
+  constexpr std::size_t kMost = std::size_t{1} << 30;
+  namespace io = boost::iostreams;
+  io::filtering_istream stream;
+  stream.push(io::gzip_decompressor());
+  stream.push(io::array_source(packed.data(), packed.size()));
+  // Otherwise what is damaged would only look shorter.
+  stream.exceptions(std::ios::badbit);
+  std::string text;
+  std::vector<char> part(std::size_t{1} << 20);
+  try {
+    while (stream.read(part.data(), static_cast<std::streamsize>(part.size())) || stream.gcount() > 0) {
+      text.append(part.data(), static_cast<std::size_t>(stream.gcount()));
+      if (text.size() > kMost) throw InputError(path + ": unpacks to more than 1 GiB; expected results of nullmark");
+    }
+  } catch (const io::gzip_error&) {
+    throw InputError(path + ": is packed by gzip, but damaged; copy it again");
+  } catch (const std::ios_base::failure&) {
+    throw InputError(path + ": is packed by gzip, but damaged; copy it again");
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string read_file(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in || fs::is_directory(path)) throw InputError(path + ": cannot be read; expected a file");
-  return {std::istreambuf_iterator<char>(in), {}};
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path) : text;
 }
 
 void write_durably(int file, const std::string& text, const std::string& path) {

@@ -4,7 +4,7 @@
 
 namespace nullmark {
 
-/// The whole file.  Throws InputError where it cannot be read.
+/// The whole file, unpacked where gzip has packed it.  Throws InputError where it cannot be read, or unpacks to more than 1 GiB.
 std::string read_file(const std::string& path);
 
 /// Puts the text in the file's place at once: whoever opens the path sees the old file or the new one, complete, even after a

@@ -526,8 +526,8 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
     const std::vector<GroupErrors::Level>& levels = sampled.groups[o].levels();
     for (std::size_t level = 0; level < levels.size(); ++level) {
       if (level >= record.convergence.size())
-        record.convergence.push_back({std::uint64_t{1} << level, std::vector<std::optional<Real>>(outputs),
-                                      std::vector<std::optional<Real>>(outputs)});
+        record.convergence.push_back(
+            {std::uint64_t{1} << level, std::vector<std::optional<Real>>(outputs), std::vector<std::optional<Real>>(outputs)});
       const Real mean_square = levels[level].sum_of_squares / static_cast<Real>(levels[level].groups);
       record.convergence[level].rmse[o] = finite(std::sqrt(mean_square));
       record.convergence[level].variance[o] = finite(std::max<Real>(0, mean_square - bias / n * (bias / n)));

@@ -2,7 +2,6 @@
 
 #include "harness/run.h"
 
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -58,10 +57,11 @@ TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
 
 /// A channel whose samples are not finite has no groups; the others keep theirs, and the results can be read.
 TEST(Run, AChannelThatIsNotFiniteTakesNothingFromTheOthers) {
-  const Plan cells = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
+  const Plan cells =
+      read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
       "samples_per_ray":64,"matrix":{"estimator":{"type":"residual_ratio","control":"average"},
       "medium":[{"type":"linear","optical_depth":0.01,"spectrum":[1,1e6]},{"type":"linear","optical_depth":0.01,"spectrum":[1e6,1]}]}}]})",
-                                 "test.json");
+                  "test.json");
   RunRecord results;
   results.cells = run(cells, 1, {});
   const RunRecord again = read_results(results_text(results), "r.json");

@@ -346,7 +346,7 @@ std::string command_line(const Json& provenance) {
     const bool plain = !word.empty() && word.find_first_of(" '\"$`\\&|;<>()*?[]{}#~!\n") == std::string::npos;
     std::string quoted;
     for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
-    line += plain ? " " + word : " '" + quoted + "'";
+    line += plain ? fmt::format(" {}", word) : fmt::format(" '{}'", quoted);
   }
   return line;
 }

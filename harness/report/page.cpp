@@ -1,7 +1,5 @@
 #include "harness/report/page.h"
 
-#include <fmt/format.h>
-
 #include <map>
 #include <string_view>
 
@@ -19,9 +17,7 @@
 
 NULLMARK_ASSET(page, NULLMARK_REPORT_FOLDER "/page.html");
 NULLMARK_ASSET(style, NULLMARK_REPORT_FOLDER "/page.css");
-NULLMARK_ASSET(format, NULLMARK_REPORT_FOLDER "/format.js");
-NULLMARK_ASSET(plots, NULLMARK_REPORT_FOLDER "/plots.js");
-NULLMARK_ASSET(script, NULLMARK_REPORT_FOLDER "/page.js");
+NULLMARK_ASSET(script, NULLMARK_PAGE_SCRIPT);
 NULLMARK_ASSET(plotly, NULLMARK_PLOTLY);
 NULLMARK_ASSET(plotly_licence, NULLMARK_PLOTLY_LICENCE);
 
@@ -59,14 +55,10 @@ std::string json_in_html(const Json& data) {
 }  // namespace
 
 std::string report_page(const Json& data) {
-  const std::string script =
-      fmt::format("{}\n{}\n{}", NULLMARK_ASSET_TEXT(format), NULLMARK_ASSET_TEXT(plots), NULLMARK_ASSET_TEXT(script));
-  const std::map<std::string_view, std::string> parts = {{"title", html(data.value("title", "nullmark"))},
-                                                         {"css", std::string(NULLMARK_ASSET_TEXT(style))},
-                                                         {"plotly", std::string(NULLMARK_ASSET_TEXT(plotly))},
-                                                         {"plotly_licence", html(NULLMARK_ASSET_TEXT(plotly_licence))},
-                                                         {"script", script},
-                                                         {"data", json_in_html(data)}};
+  const std::map<std::string_view, std::string> parts = {
+      {"title", html(data.value("title", "nullmark"))},     {"css", std::string(NULLMARK_ASSET_TEXT(style))},
+      {"plotly", std::string(NULLMARK_ASSET_TEXT(plotly))}, {"plotly_licence", html(NULLMARK_ASSET_TEXT(plotly_licence))},
+      {"script", std::string(NULLMARK_ASSET_TEXT(script))}, {"data", json_in_html(data)}};
   const std::string_view page = NULLMARK_ASSET_TEXT(page);
   std::string result;
   std::size_t at = 0;

@@ -1,0 +1,75 @@
+// `page.html?figures=1`: the main plots as files, for papers; `nullmark report --figures` takes them from the page.
+
+const paperTheme = { ink: "#111111", muted: "#666666", paper: "#ffffff", grid: "#e2e2e2" };
+const paperWidth = 900;
+const mostScenes = 12;
+const mostPictures = 8;
+
+function slugs() {
+  const taken = new Set();
+  return (text) => {
+    const base = text.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60) || "scene";
+    let slug = base;
+    for (let number = 2; taken.has(slug); ++number) slug = `${base}-${number}`;
+    taken.add(slug);
+    return slug;
+  };
+}
+
+function firstScenes(hasSomething) {
+  return scenesWith(hasSomething).slice(0, mostScenes);
+}
+
+function convergencePaper() {
+  const view = hasTimes() ? convergenceViews.time : convergenceViews.lookups;
+  const name = view === convergenceViews.time ? "error-over-time" : "error-over-lookups";
+  const scenes = firstScenes((cell) => stepsOf(cell, view).length > 0);
+  return scenes.map((scene) => ({ name: `${name} ${scene.short}`, describe: convergenceFigure(scene, view).describe }));
+}
+
+function hasTimes() {
+  return report.cells.some((cell) => stepsOf(cell, convergenceViews.time).length > 0);
+}
+
+function picturesPaper(scene, kind, tilesOf, columns) {
+  const cells = cellsWithImages(scene).slice(0, mostPictures);
+  const named = (cell) => (picture) => `${cell.label}: ${picture.title}`;
+  const tiles = () => cells.flatMap((cell) => tilesOf(cell, cells, named(cell)));
+  return { name: `${kind} ${scene.short}`, describe: (width, theme) => picturesPlot(tiles(), columns(cells[0]), width, theme) };
+}
+
+function paperFigures() {
+  const maps = (cell, cells, heading) => mapTiles(cell, cells, scaleChoices.shared_log, heading);
+  const withImages = firstScenes(hasImages);
+  const matrix = usefulMatrixViews().slice(0, 1).map(([, view]) => ({ name: "matrix", describe: matrixFigure(view).describe }));
+  return [
+    ...convergencePaper(),
+    ...firstScenes(hasParetoPoint).map((scene) => ({ name: `pareto ${scene.short}`, describe: paretoFigure(scene).describe })),
+    ...matrix,
+    ...withImages.map((scene) => picturesPaper(scene, "maps", maps, (cell) => maps(cell, [cell], String).length)),
+    ...withImages.map((scene) => picturesPaper(scene, "strips", stripTiles, (cell) => stripTiles(cell, [cell], String).length)),
+    ...scalingGroups(scalingViews.ns_per_sample).map((group) => ({
+      name: `scaling ${group.axis} ${group.rest}`, describe: scalingFigure(group, scalingViews.ns_per_sample).describe })),
+  ];
+}
+
+async function drawnForPaper({ describe }, name) {
+  const { traces, layout } = describe(paperWidth, paperTheme);
+  const figure = { data: traces, layout: { ...layout, width: paperWidth, paper_bgcolor: "#ffffff", plot_bgcolor: "#ffffff" } };
+  const size = { width: paperWidth, height: layout.height };
+  const svg = await Plotly.toImage(figure, { ...size, format: "svg", imageDataOnly: true });
+  const png = await Plotly.toImage(figure, { ...size, format: "png", scale: 2, imageDataOnly: true });
+  return { name, svg, png };
+}
+
+async function writeFigures() {
+  const slug = slugs();
+  const drawn = [];
+  for (const figure of paperFigures()) drawn.push(await drawnForPaper(figure, slug(figure.name)));
+  const place = document.createElement("script");
+  place.setAttribute("type", "application/json");
+  place.setAttribute("id", "figures");
+  place.textContent = JSON.stringify(drawn).replaceAll("<", "\\u003c");
+  document.body.append(place);
+  document.documentElement.dataset.ready = "figures";
+}

@@ -1,0 +1,77 @@
+"use strict";
+
+// Numbers and names as text.
+
+const unknown = "–";
+
+function withMinusSign(text) {
+  return text.replaceAll("-", "−");
+}
+
+function isNumber(x) {
+  return typeof x === "number" && Number.isFinite(x);
+}
+
+function formatNumber(x, digits = 4) {
+  if (!isNumber(x)) return unknown;
+  if (x === 0) return "0";
+  const size = Math.abs(x);
+  const plain = size >= 1e-3 && size < 1e6;
+  return withMinusSign(plain ? String(Number(x.toPrecision(digits))) : x.toExponential(digits - 1));
+}
+
+/** The ends of an interval; a missing end is unbounded. */
+function formatEnds(interval, format) {
+  const end = (x) => (isNumber(x) ? format(x) : "∞");
+  return `[${end(interval.low)}, ${end(interval.high)}]`;
+}
+
+function formatInterval(interval, format = (x) => formatNumber(x, 3)) {
+  if (!interval || !isNumber(interval.value)) return unknown;
+  if (interval.low === interval.high) return format(interval.value);
+  return `${format(interval.value)} ${formatEnds(interval, format)}`;
+}
+
+function formatSeconds(x) {
+  if (!isNumber(x)) return unknown;
+  const units = [[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"]];
+  const [scale, unit] = units.find(([size]) => x >= size) ?? units[units.length - 1];
+  return `${formatNumber(x / scale, 3)} ${unit}`;
+}
+
+/** Folders of volumes say nothing about the medium. */
+function shortMedium(label) {
+  return label.replace(/(?:vdb\/)?file:[^|]*?([^/|]+\.n?vdb)/, "$1");
+}
+
+/** Names of scenes without the parts that all of them share. */
+function shortSceneNames(scenes) {
+  const parts = scenes.map((scene) => scene.name.split(" | "));
+  const differs = (place) => parts.some((name) => name[place] !== parts[0][place]);
+  return parts.map((name) => {
+    const own = name.filter((_, place) => differs(place)).map(shortMedium);
+    return own.length > 0 ? own.join(" · ") : shortMedium(name.join(" · "));
+  });
+}
+
+function shortened(text, length) {
+  return text.length <= length ? text : `${text.slice(0, length - 1)}…`;
+}
+
+/** Text for plotly.js, which reads a subset of HTML. */
+function plotText(text) {
+  return String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+}
+
+function plotLines(lines) {
+  return lines.map(plotText).join("<br>");
+}
+
+function listed(names, most = 4) {
+  const rest = names.length - most;
+  return names.slice(0, most).join(", ") + (rest > 0 ? ` and ${rest} more` : "");
+}
+
+function countOf(number, noun) {
+  return `${number} ${noun}${number === 1 ? "" : "s"}`;
+}

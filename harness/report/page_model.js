@@ -1,0 +1,80 @@
+// The data, and what of it the filters let through.
+
+const report = JSON.parse(document.getElementById("data").textContent);
+
+const facets = [
+  { key: "estimator", title: "Estimators", hidden: new Set() },
+  { key: "medium", title: "Media", hidden: new Set() },
+  { key: "quantity", title: "Quantities", hidden: new Set() },
+];
+
+/** The scene that sections show where there are too many to show all. */
+let chosenScene = 0;
+
+/** As many scenes are shown side by side; of more, one at a time. */
+const fewScenes = 4;
+
+function nameThings() {
+  report.cells.forEach((cell, index) => Object.assign(cell, { index, label: cell.estimator }));
+  const names = shortSceneNames(report.scenes);
+  report.scenes.forEach((scene, index) => {
+    Object.assign(scene, { index, short: names[index] });
+    for (const entry of scene.ranking) report.cells[entry.cell].label = entry.label;
+  });
+}
+nameThings();
+
+function valuesOf(facet) {
+  return [...new Set(report.cells.map((cell) => cell[facet.key]))].sort();
+}
+
+function passes(cell) {
+  return facets.every((facet) => !facet.hidden.has(cell[facet.key]));
+}
+
+function passingCells() {
+  return report.cells.filter(passes);
+}
+
+/** Cells of a scene in the order of their ranks. */
+function cellsOf(scene) {
+  return scene.ranking.map((entry) => report.cells[entry.cell]).filter(passes);
+}
+
+function scenesWith(hasSomething) {
+  return report.scenes.filter((scene) => cellsOf(scene).some(hasSomething));
+}
+
+function hasConvergence(cell) {
+  return cell.convergence.length > 0;
+}
+
+function hasCostAndTime(cell) {
+  return Boolean(cell.cost && cell.time?.ns_per_sample);
+}
+
+/** Errors below are rounding; a scale that shows them shows nothing else. */
+const rounding = 1e-10;
+
+function isExact(cell) {
+  return cell.cost.variance.value <= (rounding * cell.cost.reference) ** 2;
+}
+
+function hasImages(cell) {
+  return cell.images !== null;
+}
+
+function secondsTo(cell, target) {
+  return cell.cost?.seconds[target] ?? null;
+}
+
+/** One word for a cell, as `nullmark check` counts it. */
+function outcomeOf(cell) {
+  if (cell.status !== "ok") return cell.status.replace("_", " ");
+  const verdict = cell.verdict;
+  if (!verdict) return "nothing claimed";
+  const parts = [verdict.outcome, verdict.lookups, verdict.laws];
+  if (parts.includes("FAIL")) return "FAIL";
+  if (!["PASS", "INCONCLUSIVE", "VIOLATED"].includes(verdict.outcome)) return "nothing claimed";
+  return verdict.outcome === "INCONCLUSIVE" && verdict.as_planned ? "INCONCLUSIVE as planned" : verdict.outcome;
+}
