@@ -249,6 +249,12 @@ const matrixViews = {
   seconds_01: { title: "seconds to .1 %", of: (cell) => secondsTo(cell, 1) },
 };
 
+/** A cost so many powers of ten above the best is not told from a higher one by its colour. */
+const mostDecades = 4;
+
+/** With more scenes than fit side by side they become the rows. */
+const mostColumns = 24;
+
 /** Rows and columns that the filters leave something of, with each cell's cost relative to the best of its column. */
 function matrixOf(view) {
   const { rows, columns, cells } = report.matrix;
@@ -288,32 +294,40 @@ function hoverOfEntry(entry, view, label, scene) {
   return plotLines([label, scene.name, `${view.title}: ${formatInterval(entry.cost)}`, relative]);
 }
 
-/** Exponents of ten from 0, at most seven of them. */
 function decades(most) {
-  const step = Math.ceil((most + 1) / 7);
-  return Array.from({ length: Math.floor(most / step) + 1 }, (_, i) => i * step);
+  return Array.from({ length: Math.floor(most) + 1 }, (_, exponent) => exponent);
 }
 
-function textOnShade(entry, shade, theme) {
-  if (entry.exact) return theme.ink;
-  return shade > 0.55 ? "#000000" : "#ffffff";
-}
-
-function matrixAnnotations({ labels, entries }, shades, most, theme) {
-  return entries.flatMap((line, row) => line.map((entry, column) => ({
+function matrixAnnotations(texts, shades, most) {
+  return texts.flatMap((line, row) => line.map((text, column) => ({
     x: column,
-    y: labels.length - 1 - row,
-    text: matrixText(entry),
+    y: texts.length - 1 - row,
+    text,
     showarrow: false,
-    font: { size: 10, color: textOnShade(entry, shades[row][column] / most, theme) },
+    font: { size: 10, color: shades[row][column] > 0.55 * most ? "#000000" : "#ffffff" },
   }))).filter(({ text }) => text !== "");
 }
 
-function matrixPlot(matrix, view, theme) {
-  const { labels, scenes, entries } = matrix;
-  const shades = entries.map((line) => line.map(({ relative }) => (relative === null ? null : Math.log10(relative))));
-  const most = Math.max(1, ...shades.flat());
+function transposed(grid) {
+  return grid[0].map((_, column) => grid.map((line) => line[column]));
+}
+
+function shadeOf(entry) {
+  if (entry.exact) return 0;
+  return entry.relative === null ? null : Math.log10(entry.relative);
+}
+
+function matrixPlot({ labels, scenes, entries }, view, theme) {
+  const hover = entries.map((line, row) => line.map((entry, column) => hoverOfEntry(entry, view, labels[row], scenes[column])));
+  const names = scenes.map((scene) => scene.short);
+  const scenesDown = scenes.length > mostColumns;
+  const turned = (grid) => (scenesDown ? transposed(grid) : grid);
+  const [down, across] = scenesDown ? [names, labels] : [labels, names];
+  const shades = turned(entries.map((line) => line.map(shadeOf)));
+  const most = Math.min(mostDecades, Math.max(1, ...shades.flat()));
   const upwards = (rows) => [...rows].reverse();
+  const rowHeight = Math.max(6, Math.min(26, 2400 / down.length));
+  const angle = across.length > 4 ? -40 : 0;
   return {
     traces: [{
       type: "heatmap",
@@ -324,32 +338,36 @@ function matrixPlot(matrix, view, theme) {
       xgap: 1,
       ygap: 1,
       hoverinfo: "text",
-      text: upwards(entries.map((line, row) => line.map((entry, column) => hoverOfEntry(entry, view, labels[row], scenes[column])))),
+      text: upwards(turned(hover)),
       colorbar: {
         title: { text: "times the best", side: "right" },
         tickvals: decades(most),
-        ticktext: decades(most).map((exponent) => (exponent < 4 ? String(10 ** exponent) : `10<sup>${exponent}</sup>`)),
+        ticktext: decades(most).map((exponent) => (exponent < mostDecades ? String(10 ** exponent) : `10<sup>${exponent}</sup> or more`)),
         thickness: 12,
         outlinewidth: 0,
+        lenmode: "pixels",
+        len: Math.max(120, Math.min(400, rowHeight * down.length)),
       },
     }],
     layout: {
       ...baseLayout(theme),
-      height: 130 + 26 * labels.length + (scenes.length > 4 ? 110 : 0),
-      annotations: scenes.length <= 16 ? matrixAnnotations(matrix, shades, most, theme) : [],
-      xaxis: matrixAxis(theme, scenes.map((scene) => scene.short), scenes.length > 4 ? -35 : 0),
-      yaxis: matrixAxis(theme, upwards(labels), 0),
+      height: 80 + rowHeight * down.length + (angle === 0 ? 0 : 150),
+      plot_bgcolor: "rgba(128,128,128,.22)",
+      annotations: across.length <= 16 && rowHeight > 14 ? matrixAnnotations(turned(entries.map((line) => line.map(matrixText))), shades, most) : [],
+      xaxis: matrixAxis(theme, across, angle, 1),
+      yaxis: matrixAxis(theme, upwards(down), 0, Math.ceil(13 / rowHeight)),
     },
   };
 }
 
-function matrixAxis(theme, names, angle) {
+function matrixAxis(theme, names, angle, every) {
+  const places = names.map((_, place) => place).filter((place) => place % every === 0);
   return {
     ...axis(theme, ""),
     showgrid: false,
     tickmode: "array",
-    tickvals: names.map((_, place) => place),
-    ticktext: names.map((name) => plotText(shortened(name, 40))),
+    tickvals: places,
+    ticktext: places.map((place) => plotText(shortened(names[place], 40))),
     tickangle: angle,
     tickfont: { size: 10 },
   };

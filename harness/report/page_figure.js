@@ -71,9 +71,16 @@ function legendFor(width, count) {
   return width < 620 ? { ...below, font } : { x: 1.02, y: 1, font };
 }
 
+/** What A4 and letter paper have room for between their margins, in pixels. */
+const printedWidth = 690;
+
+function widthOf(plot) {
+  return "paper" in document.documentElement.dataset ? printedWidth : plot.clientWidth;
+}
+
 function drawFigure(figure) {
-  const { traces, layout } = figure.describe(figure.plot.clientWidth, currentTheme());
-  const width = figure.plot.clientWidth;
+  const width = widthOf(figure.plot);
+  const { traces, layout } = figure.describe(width, currentTheme());
   figure.plot.style.minHeight = `${layout.height}px`;
   Plotly.react(figure.plot, traces, { ...layout, width }, plotConfig);
   figure.drawn = true;

@@ -8,7 +8,7 @@ const mostPictures = 8;
 function slugs() {
   const taken = new Set();
   return (text) => {
-    const base = text.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60) || "scene";
+    const base = text.toLowerCase().replace(/[^a-z0-9]+/g, "-").slice(0, 60).replace(/^-|-$/g, "") || "scene";
     let slug = base;
     for (let number = 2; taken.has(slug); ++number) slug = `${base}-${number}`;
     taken.add(slug);

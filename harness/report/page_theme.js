@@ -18,10 +18,18 @@ function plotlyScale(colours) {
 
 const styleOfLabel = new Map();
 
-/** Types take colours in the order of their names, variants of a type symbols and dashes. */
+/** These look the same in every report that has them. */
+const commonTypes = ["delta", "ratio", "next_flight_delta", "next_flight_ratio", "residual_ratio", "ray_marching", "regular", "residual_delta"];
+
+function typesInOrder(labels) {
+  const known = new Set(labels.map(([, type]) => type));
+  return [...commonTypes, ...[...known].filter((type) => !commonTypes.includes(type)).sort()];
+}
+
+/** Types take colours, variants of a type symbols and dashes. */
 function assignStyles() {
   const labels = [...new Map(report.cells.map((cell) => [cell.label, cell.type]))].sort(([a], [b]) => (a < b ? -1 : 1));
-  const types = [...new Set(labels.map(([, type]) => type))];
+  const types = typesInOrder(labels);
   const used = new Map();
   for (const [label, type] of labels) {
     const place = types.indexOf(type);
@@ -45,7 +53,7 @@ function markedLabel(label) {
   const style = styleOfLabel.get(label);
   const mark = element("span", { className: "mark", "aria-hidden": "true" }, style.glyph);
   mark.style.color = style.colour ?? "currentcolor";
-  return element("span", { className: "estimator" }, mark, " ", breakable(label));
+  return element("span", { className: "estimator" }, mark, "\u00a0", breakable(label));
 }
 
 function currentTheme() {
