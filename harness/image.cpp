@@ -69,15 +69,19 @@ void write_exr(const std::string& path, int width, int height, const std::vector
 LayeredImage read_exr(const std::string& path) {
   Imf::InputFile file(path.c_str());
   const Imath::Box2i window = file.header().dataWindow();
-  LayeredImage image{window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, {}};
+  const auto extent = [](int low, int high) { return static_cast<std::int64_t>(high) - low + 1; };
+  const std::int64_t width = extent(window.min.x, window.max.x), height = extent(window.min.y, window.max.y);
+  constexpr std::int64_t kMostAcross = 1 << 16, kMost = 1 << 26;
+  if (width < 1 || height < 1 || width > kMostAcross || height > kMostAcross || width * height > kMost)
+    throw std::runtime_error(path + ": too large");
+  LayeredImage image{static_cast<int>(width), static_cast<int>(height), {}};
   for (auto channel = file.header().channels().begin(); channel != file.header().channels().end(); ++channel) {
     if (channel.channel().type != Imf::FLOAT || channel.channel().xSampling != 1 || channel.channel().ySampling != 1)
       throw std::runtime_error(path + ": channels are not 32-bit floats, one a pixel");
     image.layers.push_back({channel.name(), {}});
   }
   const auto w = static_cast<std::size_t>(image.width), h = static_cast<std::size_t>(image.height);
-  constexpr std::size_t kMost = std::size_t{1} << 26;
-  if (w * h * image.layers.size() > kMost) throw std::runtime_error(path + ": too large");
+  if (image.layers.size() > static_cast<std::size_t>(kMost / (width * height))) throw std::runtime_error(path + ": too large");
   std::vector<std::vector<float>> pixels(image.layers.size(), std::vector<float>(w * h));
   Imf::FrameBuffer frame;
   for (std::size_t i = 0; i < pixels.size(); ++i)

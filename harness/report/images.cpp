@@ -1,5 +1,7 @@
 #include "harness/report/images.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/archive/iterators/base64_from_binary.hpp>
 #include <boost/archive/iterators/transform_width.hpp>
@@ -81,9 +83,13 @@ Picture of_kind(const LayeredImage& image, const std::string& kind) {
 Json ReportImages::add(const CellRecord& record, const std::string& results_file) {
   const auto layers = record.images.find("layers");
   if (layers == record.images.end()) return nullptr;
+  // Results may come from anywhere; their pictures lie beside them.
+  const std::filesystem::path relative(layers->second);
   LayeredImage image;
   try {
-    image = read_exr((std::filesystem::path(results_file).parent_path() / layers->second).string());
+    if (relative.is_absolute() || std::find(relative.begin(), relative.end(), "..") != relative.end())
+      throw std::runtime_error(fmt::format("{}: leads out of the folder of the results", layers->second));
+    image = read_exr((std::filesystem::path(results_file).parent_path() / relative).string());
   } catch (const std::exception& error) {
     missing_.emplace(results_file, error.what());
     return nullptr;

@@ -120,6 +120,12 @@ TEST_F(ReportImage, PicturesAreThoseOfTheRun) {
                 mean.values[i], 1e-4);
   EXPECT_EQ(k[5], 65535);
 
+  for (const char* outside : {"../a.exr", "/a.exr", "x/../../a.exr"}) {
+    run.cells[0].images["layers"] = outside;
+    data = report_data({run}, {file}, "", "");
+    ASSERT_EQ(data.warnings.size(), 1u);
+    EXPECT_NE(data.warnings[0].find("leads out"), std::string::npos);
+  }
   run.cells[0].images["layers"] = "gone.exr";
   data = report_data({run}, {file}, "", "");
   EXPECT_EQ(data.warnings.size(), 1u);
