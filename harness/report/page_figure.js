@@ -23,7 +23,7 @@ function drawIfWanted(plot) {
  * those who do not see it, `numbers()` a table of all of them.
  */
 function addFigure(parent, { title, caption, height, describe, numbers }) {
-  const plot = element("div", { className: "plot", role: "img", "aria-label": `${title}. ${caption}` });
+  const plot = element("div", { className: "graph", role: "img", "aria-label": `${title}. ${caption}` });
   plot.style.minHeight = `${height}px`;
   const whole = element("figure", {}, element("h4", {}, title), plot, element("figcaption", {}, caption));
   if (numbers) whole.append(numbersDetails(numbers));

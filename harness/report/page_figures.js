@@ -33,7 +33,8 @@ function hasTimes() {
 
 function picturesPaper(scene, kind, tilesOf, columns) {
   const cells = cellsWithImages(scene).slice(0, mostPictures);
-  const named = (cell) => (picture) => `${cell.label}: ${picture.title}`;
+  const figures = (cell) => `, RMSE ${cell.rmse.map((x) => formatNumber(x, 3)).join(", ")}`;
+  const named = (cell) => (picture) => [shortened(cell.label, 30), picture.title + (picture === imageKinds.mean ? figures(cell) : "")];
   const tiles = () => cells.flatMap((cell) => tilesOf(cell, cells, named(cell)));
   return { name: `${kind} ${scene.short}`, describe: (width, theme) => picturesPlot(tiles(), columns(cells[0]), width, theme) };
 }
@@ -46,8 +47,8 @@ function paperFigures() {
     ...convergencePaper(),
     ...firstScenes(hasParetoPoint).map((scene) => ({ name: `pareto ${scene.short}`, describe: paretoFigure(scene).describe })),
     ...matrix,
-    ...withImages.map((scene) => picturesPaper(scene, "maps", maps, (cell) => maps(cell, [cell], String).length)),
-    ...withImages.map((scene) => picturesPaper(scene, "strips", stripTiles, (cell) => stripTiles(cell, [cell], String).length)),
+    ...withImages.map((scene) => picturesPaper(scene, "maps", maps, (cell) => maps(cell, [cell], titleLine).length)),
+    ...withImages.map((scene) => picturesPaper(scene, "strips", stripTiles, (cell) => stripTiles(cell, [cell], titleLine).length)),
     ...scalingGroups(scalingViews.ns_per_sample).map((group) => ({
       name: `scaling ${group.axis} ${group.rest}`, describe: scalingFigure(group, scalingViews.ns_per_sample).describe })),
   ];
