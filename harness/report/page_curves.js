@@ -143,13 +143,19 @@ function convergenceFigure(scene, view) {
   };
 }
 
+/** Results without timing still show errors over lookups. */
+function usefulConvergenceViews() {
+  return Object.entries(convergenceViews).filter(([, view]) => report.cells.some((cell) => stepsOf(cell, view).length > 0));
+}
+
 function buildError(body) {
-  let view = convergenceViews.time;
-  const choice = selectOf("Show", Object.entries(convergenceViews).map(([key, { title }]) => [key, title.toLowerCase()]), (key) => {
+  const views = usefulConvergenceViews();
+  let view = views[0][1];
+  const choice = selectOf("Show", views.map(([key, { title }]) => [key, title.toLowerCase()]), (key) => {
     view = convergenceViews[key];
     update();
   });
-  const drawable = (cell) => hasConvergence(cell) && stepsOf(cell, view).length > 0;
+  const drawable = (cell) => stepsOf(cell, view).length > 0;
   const update = scenePanels(body, drawable, (panel, scene) => addFigure(panel, convergenceFigure(scene, view)), [choice.label]);
   return update;
 }
@@ -268,7 +274,7 @@ function matrixOf(view) {
   const keptRows = rows.map((_, row) => row).filter((row) => grid[row].some(known));
   const keptColumns = columns.map((_, column) => column).filter((column) => keptRows.some((row) => known(grid[row][column])));
   const best = keptColumns.map((column) =>
-    Math.min(...keptRows.map((row) => grid[row][column]).filter((entry) => known(entry) && !isExact(entry.cell)).map(({ cost }) => cost.value)));
+    Math.min(...keptRows.map((row) => grid[row][column]).filter((entry) => known(entry) && !costsNothing(entry)).map(({ cost }) => cost.value)));
   return {
     labels: keptRows.map((row) => rows[row]),
     scenes: keptColumns.map((column) => report.scenes[columns[column].scene]),
@@ -276,22 +282,28 @@ function matrixOf(view) {
   };
 }
 
+/** Without variance, or without lookups where those are the cost. */
+function costsNothing({ cell, cost }) {
+  return cost.value === 0 || isExact(cell);
+}
+
 function relativeEntry(entry, best) {
   const value = entry?.cost?.value;
   if (!isNumber(value)) return { ...entry, relative: null };
-  return { ...entry, relative: isExact(entry.cell) ? null : value / best, exact: isExact(entry.cell) };
+  const nothing = costsNothing(entry);
+  return { ...entry, relative: nothing ? null : value / best, nothing };
 }
 
 function matrixText(entry) {
   if (!entry.cell) return "";
-  if (entry.exact) return "exact";
+  if (entry.nothing) return isExact(entry.cell) ? "exact" : "0";
   return entry.relative === null ? "" : formatNumber(entry.relative, entry.relative < 100 ? 2 : 3);
 }
 
 function hoverOfEntry(entry, view, label, scene) {
   if (!entry.cell) return plotLines([label, scene.name, "not measured"]);
-  const relative = entry.exact ? "exact but for rounding" : entry.relative === null ? "" : `${formatNumber(entry.relative, 3)} times the best of the column`;
-  return plotLines([label, scene.name, `${view.title}: ${formatInterval(entry.cost)}`, relative]);
+  const relative = entry.relative === null ? "" : `${formatNumber(entry.relative, 3)} times the best of the scene`;
+  return plotLines([label, scene.name, `${view.title}: ${formatInterval(entry.cost)}`, entry.nothing && isExact(entry.cell) ? "exact but for rounding" : relative]);
 }
 
 function decades(most) {
@@ -313,7 +325,7 @@ function transposed(grid) {
 }
 
 function shadeOf(entry) {
-  if (entry.exact) return 0;
+  if (entry.nothing) return 0;
   return entry.relative === null ? null : Math.log10(entry.relative);
 }
 
@@ -493,9 +505,14 @@ function scalingFigure(group, view) {
   };
 }
 
+function usefulScalingViews() {
+  return Object.entries(scalingViews).filter(([, view]) => scalingGroups(view).length > 0);
+}
+
 function buildScaling(body) {
-  let view = scalingViews.ns_per_sample;
-  const choice = selectOf("Show", Object.entries(scalingViews).map(([key, { title }]) => [key, title]), (key) => {
+  const views = usefulScalingViews();
+  let view = views[0][1];
+  const choice = selectOf("Show", views.map(([key, { title }]) => [key, title]), (key) => {
     view = scalingViews[key];
     update();
   });

@@ -21,14 +21,10 @@ function firstScenes(hasSomething) {
 }
 
 function convergencePaper() {
-  const view = hasTimes() ? convergenceViews.time : convergenceViews.lookups;
+  const view = usefulConvergenceViews()[0]?.[1] ?? convergenceViews.time;
   const name = view === convergenceViews.time ? "error-over-time" : "error-over-lookups";
   const scenes = firstScenes((cell) => stepsOf(cell, view).length > 0);
   return scenes.map((scene) => ({ name: `${name} ${scene.short}`, describe: convergenceFigure(scene, view).describe }));
-}
-
-function hasTimes() {
-  return report.cells.some((cell) => stepsOf(cell, convergenceViews.time).length > 0);
 }
 
 function picturesPaper(scene, kind, tilesOf, columns) {
@@ -37,6 +33,11 @@ function picturesPaper(scene, kind, tilesOf, columns) {
   const named = (cell) => (picture) => [shortened(cell.label, 30), picture.title + (picture === imageKinds.mean ? figures(cell) : "")];
   const tiles = () => cells.flatMap((cell) => tilesOf(cell, cells, named(cell)));
   return { name: `${kind} ${scene.short}`, describe: (width, theme) => picturesPlot(tiles(), columns(cells[0]), width, theme) };
+}
+
+function scalingPaper() {
+  const view = usefulScalingViews()[0]?.[1] ?? scalingViews.ns_per_sample;
+  return scalingGroups(view).map((group) => ({ name: `scaling ${group.axis} ${group.rest}`, describe: scalingFigure(group, view).describe }));
 }
 
 function paperFigures() {
@@ -49,8 +50,7 @@ function paperFigures() {
     ...matrix,
     ...withImages.map((scene) => picturesPaper(scene, "maps", maps, (cell) => maps(cell, [cell], titleLine).length)),
     ...withImages.map((scene) => picturesPaper(scene, "strips", stripTiles, (cell) => stripTiles(cell, [cell], titleLine).length)),
-    ...scalingGroups(scalingViews.ns_per_sample).map((group) => ({
-      name: `scaling ${group.axis} ${group.rest}`, describe: scalingFigure(group, scalingViews.ns_per_sample).describe })),
+    ...scalingPaper(),
   ];
 }
 

@@ -45,10 +45,6 @@ function scenesWith(hasSomething) {
   return report.scenes.filter((scene) => cellsOf(scene).some(hasSomething));
 }
 
-function hasConvergence(cell) {
-  return cell.convergence.length > 0;
-}
-
 function hasCostAndTime(cell) {
   return Boolean(cell.cost && cell.time?.ns_per_sample);
 }

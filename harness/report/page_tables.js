@@ -167,8 +167,9 @@ function rankText(entry) {
   return entry.tied ? `=${entry.rank}` : String(entry.rank);
 }
 
-function reachedText(target) {
-  if (!target) return unknown;
+function reachedText(cell, place) {
+  const target = secondsTo(cell, place);
+  if (!target || !cell.time?.ns_per_sample) return unknown;
   return target.reached ? intervalText(target, formatSeconds) : "never";
 }
 
@@ -185,7 +186,7 @@ function rankingRow(scene, entry) {
   const row = tableRow([
     rankText(entry),
     element("span", {}, markedLabel(entry.label), entry.cell === scene.baseline ? element("span", { className: "tag" }, "baseline") : "", claimTag(cell) ?? ""),
-    intervalText(entry.relative), reachedText(secondsTo(cell, 0)), reachedText(secondsTo(cell, 1)), intervalText(cost?.variance),
+    intervalText(entry.relative), reachedText(cell, 0), reachedText(cell, 1), intervalText(cost?.variance),
     intervalText(cost?.variance_x_ns), intervalText(cost?.variance_x_lookups), cost?.floor ? intervalText(cost.floor) : "",
     breakEvenText(scene, entry.cell)]);
   row.dataset.ranked = String(entry.cell);
