@@ -60,6 +60,9 @@ struct Control {
        growth = 0;  ///< profile: first + growth s, or first e^{growth s}, s = (t - begin)/length
   int channels = 1;
   Value depth;  ///< tau_c over the ray
+  /// int max(mu_c, mu_max - mu_c - 2 mubr), at most its largest channel's: with |w| = |1 - (mu - mu_c)/mubr| the residual's weight
+  /// has E|W| <= e^growth_depth [Poisson product].
+  Real growth_depth = 0;
 
   template <class Distance>
   Distance profile(const Distance& t) const {
@@ -104,6 +107,7 @@ void prepare_control(const ControlChoice& choice, const Passage<Value>& ray, Con
   control.length = ray.length();
   control.first = choice.value;
   control.depth = ray.value(0);
+  control.growth_depth = 0;
   residual.start(ray.begin, ray.bounds.crossing);
   if (!(ray.length() > 0)) return;
   if (control.linear) {
@@ -148,7 +152,12 @@ void prepare_control(const ControlChoice& choice, const Passage<Value>& ray, Con
     Real deviation = 0;
     for (int c = 0; c < ray.channels; ++c)
       deviation = std::max({deviation, channel(high, c) - channel(least, c), channel(most, c) - channel(low, c)});
-    residual.append(segment.end, choice.rate_scale * (choice.rate == "majorant" ? segment.majorant : deviation));
+    const Real rate = choice.rate_scale * (choice.rate == "majorant" ? segment.majorant : deviation);
+    residual.append(segment.end, rate);
+    Real growth = 0;
+    for (int c = 0; c < ray.channels; ++c)
+      growth = std::max({growth, channel(most, c), channel(high, c) - channel(least, c) - 2 * rate});
+    control.growth_depth += growth * (segment.end - segment.begin);
   }
 }
 

@@ -5,6 +5,7 @@
 #include "estimators/estimator.h"
 #include "estimators/event_choice.h"
 #include "estimators/kinks.h"
+#include "estimators/survival.h"
 
 namespace nullmark {
 
@@ -96,10 +97,12 @@ struct HeroWavelengthTracking {
       if (l == c) seen = whole;
     }
     if (seen < profile.optical_depth(c) * (1 - 1e-12)) theory.mean = std::exp(-seen);
-    for (std::size_t j = 0; j < rate.size(); ++j) alive[j] *= rate[j];
-    std::size_t j = 0;
-    theory.lookups = profile.integrate(0, [&](const RayProfile::Node&) { return alive[j++]; });
+    std::vector<Real> through = rate;
+    for (std::size_t j = 0; j < rate.size(); ++j)
+      through[j] -= std::min(profile.nodes(c)[j].extinction, rate[j]);
+    state_lookups(theory, profile, rate, through, alive);
     if (ray.channels == 1) theory.variance = std::exp(-seen) * -std::expm1(-seen);
+    if (ray.channels > 1) theory.lookups_variance.reset();
     if (ray.channels > 1 && constant) theory.variance = variance_of_constant(ray, profile, c);
     return theory;
   }

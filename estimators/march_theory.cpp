@@ -80,7 +80,7 @@ Theory stratified_march(const RayProfile& profile, int c, int steps, Quantity qu
     tau_variance += depth_spread;
   }
   if (quantity == Quantity::optical_depth) return {.mean = tau, .variance = tau_variance};
-  return {.mean = std::exp(log_mean), .variance = std::exp(2 * log_mean) * std::expm1(log_growth)};
+  return {.mean = std::exp(log_mean), .variance = product_variance(log_mean, log_growth)};
 }
 
 Theory uniform_march(const RayProfile& profile, int c, int steps, Quantity quantity) {

@@ -49,12 +49,11 @@ struct RatioTracking {
   }
 
   Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
-    const Real transmittance = std::exp(-profile.optical_depth(c));
     const Real spread = profile.integrate(c, [&](const RayProfile::Node& at) {
       return at.extinction > 0 ? at.extinction * at.extinction / ray.majorant.rate(at.piece) : 0;
     });
     const Real lookups = ray.majorant.total_depth();
-    return {.variance = transmittance * transmittance * std::expm1(spread), .lookups = lookups, .lookups_variance = lookups};
+    return {.variance = product_variance(-profile.optical_depth(c), spread), .lookups = lookups, .lookups_variance = lookups};
   }
 };
 

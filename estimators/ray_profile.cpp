@@ -7,6 +7,10 @@
 #include <boost/math/special_functions/legendre.hpp>
 
 namespace nullmark {
+
+Real product_variance(Real log_mean, Real spread) {
+  return std::exp(2 * log_mean + spread) * -std::expm1(-spread);
+}
 namespace {
 
 constexpr int kNodes = RayProfile::kNodes;

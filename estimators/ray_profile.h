@@ -10,6 +10,10 @@
 
 namespace nullmark {
 
+/// e^{2 log_mean} (e^spread - 1), the variance of a product of Poisson many independent weights; also where a factor has left the
+/// range of numbers and the product has not.
+Real product_variance(Real log_mean, Real spread);
+
 /// The extinction along one ray, sampled so that one-dimensional integrals of it, of the running optical depth and of piecewise
 /// constant rates are exact to quadrature error: Gauss-Legendre nodes on panels that are cut at the medium's knots and at segment
 /// ends, and finely enough that no panel is deeper than a few units of the majorant.

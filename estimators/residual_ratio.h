@@ -8,6 +8,10 @@ namespace nullmark {
 /// ratio estimate of the residual's at rate mubr.  Unbiased for any mubr > 0.  Multiplicands lie in [0,2] with mubr >= max |mu -
 /// mu_c|, so samples are non-negative but unbounded.  Var = T^2 (exp(int (mu - mu_c)^2/mubr) - 1), lookups int mubr.  `component`
 /// gives T_c or T_r alone.
+///
+/// Where T_c is as small as e^-1000, T_r is as large as e^1000: such walks carry sgn(W) |W|^(1/2^roots) and the product is taken
+/// before it is raised.  By Markov's inequality a weight outgrows e^growth_depth 2^k with probability 2^-k, so `roots` covers
+/// k = 200, and 60 in float; a product that is no number still is one that is not there: T_r alone beyond 10^308.
 template <class Value>
 struct ResidualRatioTracking {
   static constexpr const char* kName = "residual_ratio";
@@ -41,12 +45,19 @@ struct ResidualRatioTracking {
     Control<Value> control;
     Rates residual;
     bool with_control = true, with_residual = true;
+    int roots = 0, roots_in_float = 0;
   };
 
   void prepare(Ray& ray) const {
     prepare_control<Value>(choice, ray, ray.control, ray.residual);
     ray.with_control = component != "residual";
     ray.with_residual = component != "control";
+    const auto roots = [&](int exponents, int spare) {
+      const Real powers = ray.control.growth_depth / std::log(Real{2}) / (exponents - spare);
+      return powers > 1 ? static_cast<int>(std::ceil(std::log2(powers))) : 0;
+    };
+    ray.roots = roots(std::numeric_limits<Real>::max_exponent, 200);
+    ray.roots_in_float = roots(std::numeric_limits<float>::max_exponent, 60);
   }
 
   struct Walk {
@@ -61,15 +72,17 @@ struct ResidualRatioTracking {
   auto propose(Walk&, const auto& ray, auto& flight, auto& rng) const { return flight.next(rng, ray.with_residual); }
 
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
-    walk.weight *= (at.rate() - (extinction - ray.control.at(at.position(), at.piece()))) / at.rate();
+    Value factor = (at.rate() - (extinction - ray.control.at(at.position(), at.piece()))) / at.rate();
+    for (int i = roots(ray); i > 0; --i) factor = signed_root(factor);
+    walk.weight *= factor;
   }
 
   Value result(const Walk& walk, const auto& ray) const {
-    return ray.with_control ? Value(exponential(Value(-ray.control.depth)) * walk.weight) : walk.weight;
+    return product(ray.with_control ? Value(-ray.control.depth) : Value(ray.value(0)), walk.weight, roots(ray));
   }
 
   Value transmittance_at(const Walk& walk, const Ray& ray, Real distance) const {
-    return exponential(Value(-ray.control.depth_to(distance))) * walk.weight;
+    return product(Value(-ray.control.depth_to(distance)), walk.weight, roots(ray));
   }
 
   Value expected(const Value& tau, const Ray& ray) const {
@@ -98,7 +111,17 @@ struct ResidualRatioTracking {
     });
     const Real log_mean = -profile.optical_depth(c) + (ray.with_control ? 0 : channel(ray.control.depth, c));
     const Real lookups = ray.residual.total_depth();
-    return {.variance = std::exp(2 * log_mean) * std::expm1(spread), .lookups = lookups, .lookups_variance = lookups};
+    return {.variance = product_variance(log_mean, spread), .lookups = lookups, .lookups_variance = lookups};
+  }
+
+ private:
+  static int roots(const auto& ray) { return kInFloat<Value> ? ray.roots_in_float : ray.roots; }
+
+  /// e^log_control W, given the 2^roots-th root of W.
+  static Value product(const Value& log_control, const Value& root, int roots) {
+    Value x = exponential(Value(log_control * std::ldexp(Real{1}, -roots))) * root;
+    for (; roots > 0; --roots) x = signed_square(x);
+    return x;
   }
 };
 

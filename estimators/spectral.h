@@ -170,7 +170,12 @@ struct SpectralTracking {
                    Real scatter, Real null) {
     const Real own = kind == EventKind::absorb ? absorb : kind == EventKind::scatter ? scatter : null;
     const Real sum = absorb + scatter + null;
-    walk.weight = own > 0 ? Value(walk.weight * mu.of(kind) * (sum / (own * rate))) : ray.value(0);
+    if (!(own > 0))
+      walk.weight = ray.value(0);
+    else if (own * rate < least_normal(rate))  // of extinctions near the least number the product is none
+      walk.weight *= mu.of(kind) / own * (sum / rate);
+    else
+      walk.weight *= mu.of(kind) * (sum / (own * rate));
   }
 
   /// Chances of a lookup and of a null collision at a point, and the null collision's factor of the weights.

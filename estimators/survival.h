@@ -49,9 +49,10 @@ std::optional<std::vector<Real>> survival(const RayProfile& profile, F&& f) {
 
 /// Moments of the lookups N of a walk, from three functions at the nodes of the profile: the rate at which it looks up while it
 /// is alive, the part of it that leaves it alive, and its chance to be alive: E N = int rate alive, E N(N-1) = 2 int rate(y)
-/// alive(y) int_0^y through dx dy.
+/// alive(y) int_0^y through dx dy.  Not stated where the profile is too coarse for the boundary layer that `alive` is.
 inline void state_lookups(Theory& theory, const RayProfile& profile, const std::vector<Real>& rate,
                           const std::vector<Real>& through, const std::vector<Real>& alive) {
+  if (!profile.resolved()) return;
   const auto integral = [&](const std::vector<Real>& values) {
     std::size_t j = 0;
     return profile.integrate(0, [&](const RayProfile::Node&) { return values[j++]; });
@@ -77,7 +78,7 @@ inline Theory theory_of_escape_weight(const RayProfile& profile, int c, const st
   const Real depth = profile.optical_depth(c);
   std::size_t j = 0;
   const Real second = profile.integrate(c, [&](const RayProfile::Node&) { return growth[j++]; });
-  Theory theory{.variance = std::exp(-2 * depth) * std::expm1(second + 2 * depth)};
+  Theory theory{.variance = product_variance(-depth, second + 2 * depth)};
   state_lookups(theory, profile, rate, through, alive);
   return theory;
 }

@@ -66,7 +66,7 @@ struct WeightedDeltaTracking {
       if (!(mub > 0)) return Real{0};
       return std::abs(mub - at.extinction) * sum_of_rates(at.extinction, mub) / mub - mub;
     });
-    Theory theory{.variance = std::exp(-2 * depth) * std::expm1(growth + 2 * depth)};
+    Theory theory{.variance = product_variance(-depth, growth + 2 * depth)};
     state_lookups_until_killed(theory, profile, killed, rate);
     return theory;
   }

@@ -24,7 +24,6 @@ class BlockKernel : public Kernel {
 
  protected:
   /// A walk this long is reported as an error instead of running on: nothing may hang, and nothing may be cut short in silence.
-  static constexpr std::uint32_t kMostLookups = 1u << 30;
   static constexpr std::uint32_t kStepsBetweenStops = 1u << 14;
 
   struct State : Workspace {
@@ -236,7 +235,7 @@ class BlockKernel : public Kernel {
         }
         audit(ray, state.flight[k], extinction, counters);
         estimator_.consume(state.walk[k], ray, state.flight[k], extinction, state.rng[k]);
-        if (++lookups[k] == kMostLookups) {
+        if (++lookups[k] == state.most_lookups) {
           ++counters.overruns;
           active = 0;
         }

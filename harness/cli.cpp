@@ -20,6 +20,7 @@
 #include "harness/registry.h"
 #include "harness/results_json.h"
 #include "harness/schema.h"
+#include "harness/stability.h"
 #include "harness/summary.h"
 #include "media/registry.h"
 #include "media/vdb_writer.h"
@@ -132,11 +133,15 @@ class CommandLine {
       RunRecord run = load_all({file_})[0];
       const Summary summary = summarise(run);
       if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
-      if (!markdown_.empty()) write_atomically(markdown_, summary_markdown(run, summary, file_));
+      if (!markdown_.empty())
+        write_atomically(markdown_, summary_markdown(run, summary, file_) + (cases_ ? "\n" + stability_markdown(run) : ""));
+      if (cases_) fmt::print("{}\n", stability_text(run));
       fmt::print("{}", summary_text(run, summary));
       return summary.exit;
     });
     command->add_option("RESULTS", file_, "Results file")->required();
+    command->add_flag("--cases", cases_,
+                      "Also show per experiment and tracker what was finite, the largest sample, the worst error, the guards that fired");
     command->add_option("--junit", junit_, "Also write a JUnit report");
     command->add_option("--markdown", markdown_, "Also write a summary for a pull request");
   }
@@ -247,7 +252,7 @@ class CommandLine {
   ProceduralVdb volume_;
   std::vector<std::string> files_;
   std::string file_, baseline_, schema_, format_, output_, junit_, markdown_;
-  bool force_ = false, paired_ = false;
+  bool force_ = false, paired_ = false, cases_ = false;
 };
 
 /// Cells of two trackers of one name could not be told apart.

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "harness/comparison.h"
-#include "harness/summary.h"
 #include "harness/table.h"
 
 namespace nullmark {
@@ -81,18 +80,6 @@ std::vector<Line> pairs(const Contest& contest) {
 
 std::string baseline_line(const Contest& contest) {
   return contest.baseline ? fmt::format("baseline: {}", contest.contenders[*contest.baseline].label) : "no baseline here";
-}
-
-std::string markdown_table(const std::vector<Line>& lines) {
-  std::string text;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    for (const std::string& word : lines[i]) text += fmt::format("| {} ", escaped(word));
-    text += "|\n";
-    if (i > 0) continue;
-    for (std::size_t c = 0; c < lines[0].size(); ++c) text += "|---";
-    text += "|\n";
-  }
-  return text;
 }
 
 }  // namespace

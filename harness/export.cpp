@@ -115,6 +115,7 @@ Row csv_row(const CellRecord& record, std::size_t c) {
           {"null_collisions_per_sample", csv_number(record.null_collisions_per_sample)},
           {"rng_draws_per_sample", csv_number(record.draws_per_sample)},
           {"majorant_violations", fmt::to_string(record.majorant_violations)},
+          {"largest_sample", csv_number(record.largest_sample)},
           {"nonfinite", fmt::to_string(record.nonfinite)},
           {"ns_per_sample", csv_number(metric(record, "ns_per_sample"))},
           {"ns_per_lookup", csv_number(metric(record, "ns_per_lookup"))},

@@ -17,11 +17,16 @@ constexpr Real kFailRates[] = {0.4, 1.5}, kPassRates[] = {0.5, 0.9};
 /// Catoni's variance bound over the known variance: quadrature slack, and what PASS concedes ("given Var <= 1.25 sigma^2").
 constexpr Real kFailSlack = 1.02, kPassSlack = 1.25, kPilotSlack = 2;
 
+/// Numbers below have fewer digits than others.
+Real least_of(Precision precision) {
+  return precision == Precision::float64 ? std::numeric_limits<Real>::min() : Real{std::numeric_limits<float>::min()};
+}
+
 /// What single precision may add to a mean: every factor of a weight is off by a few units in its last place, and all of them
 /// may be so to the same side, and numbers below the least normal one have no digits left.
 Real single_error(const Cell& cell, Real mean, Real lookups) {
   if (cell.precision == Precision::float64) return 0;
-  return 2 * epsilon_of(cell.precision) * std::abs(mean) * (1 + lookups) + std::numeric_limits<float>::min();
+  return 2 * epsilon_of(cell.precision) * std::abs(mean) * (1 + lookups) + least_of(cell.precision);
 }
 
 /// Where the standard deviation is a millionth of rounding, no sample in 10^12 shows it, whatever its law [Chebyshev].
@@ -29,6 +34,10 @@ constexpr Real kSurely = 1e-12;
 
 /// A pilot variance is trusted for unbounded samples only below this variance of the variance.
 constexpr Real kTrustedVariance = 0.02;
+
+/// A pilot's variance of lookups is trusted from so many samples, and so many lookups among them, on: flights are at most as
+/// heavy in the tail as an exponential (variance of the variance 8/n), and lookups that are rare as a Poisson number (1/lookups).
+constexpr std::uint64_t kTellingLookups = 400;
 
 /// Margin of the groups over that of all rays: as many standard errors as in the pooled test.
 const Real kGroupMargin = std::sqrt(static_cast<Real>(kRayGroups));
@@ -54,6 +63,9 @@ Real score_epsilon(const Cell& cell, Real mean) {
 /// all would pass.
 Real absolute_epsilon(const Cell& cell, Real mean) {
   if (cell.quantity == Quantity::free_path) return score_epsilon(cell, mean);
+  // A mean that has underflowed has no part of itself.
+  const Real least = 16 * least_of(cell.precision);
+  if (!(std::abs(mean) > least)) return least;
   if (cell.gate.epsilon) return *cell.gate.epsilon * mean;
   if (cell.quantity == Quantity::optical_depth || cell.quantity == Quantity::radiance) return 0.01 * std::abs(mean);
   const Real margin = default_epsilon(mean) * mean, absorbed = 1 - mean;
@@ -224,7 +236,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
   const bool distrusted = !analytic && !bounded && pilot->variance_of_variance >= kTrustedVariance;
   std::vector<Pool> pools;
   const Real ulp = epsilon_of(cell.precision);
-  const Real mean_lookups = theory.lookups.value_or(0);
+  const Real mean_lookups = theory.lookups.value_or(theory.majorant_depth);
   for (std::size_t o = 0; o < outputs; ++o) {
     std::vector<Pool> by_group(static_cast<std::size_t>(groups) + 1);
     for (std::size_t ray = 0; ray < rays; ++ray) {
@@ -254,7 +266,8 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
       test.reference_error = pool.reference_error / n + single_error(cell, pool.mean, mean_lookups);
       test.variance = pool.variance / n;
       const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0;
-      test.rounding = 64 * ulp * (1 + mean_lookups + depth) * std::max(std::abs(pool.most), std::abs(pool.least));
+      test.rounding = std::max(64 * ulp * (1 + mean_lookups + depth) * std::max(std::abs(pool.most), std::abs(pool.least)),
+                               least_of(cell.precision));
       // Rare events that a pilot did not see are no proof of a zero variance.
       test.deterministic = analytic && !(test.variance > kSurely * test.rounding * test.rounding);
       if (!analytic && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
@@ -289,7 +302,8 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
   }
   if (hardest && gate.undecidable.empty()) {
     const MeanTest& test = gate.tests[*hardest];
-    const Real mean = std::abs(pools[*hardest].mean);
+    // Relative to a mean that has underflowed nothing can be said.
+    const Real mean = std::max(std::abs(pools[*hardest].mean), least_of(cell.precision));
     if (kPatience * test.planned > gate.affordable && test.planned > cell.samples_per_ray)
       gate.undecidable = fmt::format(
           "PASS at epsilon {:.2g} needs about {:.2g} samples a ray (relative variance {:.2g}) and room for {} times as many; {} "
@@ -325,11 +339,15 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
     test.reference_error = kTheoryError * pool.mean / n;
     test.variance = pool.variance / n;
     test.rounding = test.reference_error;
-    test.deterministic = !(test.variance > kSurely * test.rounding * test.rounding);
+    const bool seen = known_spread || std::min(pilot->samples, pilot->lookups) >= kTellingLookups;
+    test.deterministic = seen && !(test.variance > kSurely * test.rounding * test.rounding);
+    // Numbers of lookups are whole: a mean between two of them varies by at least so much.
+    if (!seen) test.variance = std::max(test.variance, pool.mean / n * (1 - std::min<Real>(1, pool.mean / n)));
     if (test.deterministic) {
       test.basis = "deterministic";
     } else {
       set_bets(test, pool, 0, kInfinity, known_spread, gate.lookups_per_sum);
+      if (!seen) drop_catoni(test);
       clip_rates(test, pool, 0, kInfinity, gate.lookups_per_sum);
       test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), rays);
     }

@@ -76,6 +76,9 @@ class Workspace {
   /// Asked now and then, so that endless walks can be interrupted; once it answers true the block under way is given up and its
   /// samples must not be used.
   std::function<bool()> stop = [] { return false; };
+  /// Lookups that one walk may take.  The block with a walk that takes more is given up and counted as an overrun, which makes
+  /// the cell an error: a walk cut short in silence would be biased.
+  std::uint32_t most_lookups = 1u << 30;
   /// Where walks are written down; usually nowhere.
   Recording* recording = nullptr;
 };

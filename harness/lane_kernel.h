@@ -134,7 +134,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       lanes = close_ranks(lanes, tally);
       for (std::uint32_t step = 1; lanes > 0; ++step) {
         if (step % Base::kStepsBetweenStops == 0 && state.stop()) return;
-        if (step == Base::kMostLookups) {
+        if (step == state.most_lookups) {
           counters.overruns += lanes - tally.dead;
           break;
         }

@@ -180,6 +180,11 @@ TEST(Lanes, ResidualRatioTrackingIsTheSameAtEveryWidth) {
         estimator.choice.value_end = 2;
         estimator.component = component;
       });
+  // Deep enough for roots of weights, in float and in double.
+  compare_widths<ResidualRatioTracking>([](auto& estimator) {
+    estimator.choice.kind = "given";
+    estimator.choice.value = 2000;
+  });
 }
 TEST(Lanes, RayMarchingIsTheSameAtEveryWidth) {
   for (const char* offset : {"left", "midpoint", "right", "uniform", "stratified"})

@@ -7,7 +7,6 @@
 #include <map>
 
 #include "harness/junit.h"
-#include "harness/summary.h"
 #include "harness/table.h"
 
 namespace nullmark {

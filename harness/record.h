@@ -125,6 +125,7 @@ struct CellRecord {
   std::optional<std::uint64_t> instructions;  ///< that drawing the samples took, counted in a simulator; see performance_gate.md
   std::uint64_t majorant_violations = 0, nonfinite = 0;
   std::optional<Real> largest_violation;  ///< max mu / mub seen beyond 1
+  std::optional<Real> largest_sample;     ///< max |X| of the finite samples, all outputs together
   std::optional<TimeRecord> time;
   std::optional<VerdictRecord> verdict;
   std::vector<ConvergenceRecord> convergence;

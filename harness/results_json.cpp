@@ -322,6 +322,7 @@ Json cell_json(const CellRecord& record) {
       {"squared_error_blocks", record.squared_error_blocks},
       {"majorant_violations", record.majorant_violations},
       {"largest_violation", real(record.largest_violation)},
+      {"largest_sample", real(record.largest_sample)},
       {"nonfinite", record.nonfinite},
       {"verdict", record.verdict ? verdict_json(*record.verdict) : Json(nullptr)},
       {"time", time_json(record)},
@@ -385,6 +386,7 @@ CellRecord read_cell(const Place& place) {
   if (place.has("instructions")) record.instructions = count(place, "instructions");
   record.majorant_violations = count(place, "majorant_violations");
   record.largest_violation = optional_real(place, "largest_violation");
+  record.largest_sample = optional_real(place, "largest_sample");
   record.nonfinite = count(place, "nonfinite");
   if (place.has("verdict") && !place["verdict"].json().is_null()) record.verdict = read_verdict(place["verdict"]);
   if (place.has("time") && !place["time"].json().is_null()) record.time = read_time(place["time"]);

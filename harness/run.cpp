@@ -252,16 +252,19 @@ void add_theory(std::vector<PreparedCell>& cells) {
   }
 }
 
-/// What verdicts and all statistics cost beside the sampling they are of.
+/// What verdicts and all statistics cost beside the sampling they are of, and the walks that did not end.
 struct Effort {
   double judging = 0, statistics = 0, working = 0;
+  std::uint64_t overruns = 0;
   Effort& operator+=(const Sampled& sampled) {
+    overruns += sampled.counters.overruns;
     judging += sampled.judging_seconds;
     statistics += sampled.statistics_seconds;
     working += sampled.working_seconds;
     return *this;
   }
   Effort& operator+=(const Effort& other) {
+    overruns += other.overruns;
     judging += other.judging;
     statistics += other.statistics;
     working += other.working;
@@ -297,6 +300,8 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function
     const Real mean = static_cast<Real>(sampled->lookups[ray]) / n;
     pilot.lookups_variance.push_back(std::max<Real>(0, (sampled->lookups_squared[ray] - n * mean * mean) / (n - 1)));
   }
+  pilot.samples = sampled->counters.samples;
+  pilot.lookups = sampled->counters.lookups;
   // Below this share of the raw moment a central one is rounding.
   constexpr Real kCancelled = 1e-6;
   const auto count = n * static_cast<Real>(sampled->lookups.size());
@@ -475,15 +480,13 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
   record.lookups_variance = lookups_variance(sampled, samples);
   record.majorant_violations = sampled.counters.violations;
   if (sampled.counters.violations > 0) record.largest_violation = finite(sampled.counters.largest_violation);
+  record.largest_sample = finite(sampled.largest);
   record.nonfinite = sampled.nonfinite;
   record.reference_method = targets.method + (cell.measurement == Measurement{} ? "" : ", measured");
   record.status = Status::ok;
   if (sampled.nonfinite > 0) {
     record.status = Status::error;
     record.reason = fmt::format("{} of {} samples are not finite", sampled.nonfinite, sampled.counters.samples);
-  } else if (sampled.counters.overruns > 0) {
-    record.status = Status::error;
-    record.reason = fmt::format("{} walks exceeded the bound on lookups", sampled.counters.overruns);
   }
   record.variance_basis = "sample";
   if (targets.known && targets.names.empty()) record.squared_error_blocks = squared_error_blocks(sampled);
@@ -647,6 +650,10 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     record.status = Status::error;
     record.nonfinite += verdict->nonfinite;
     record.reason = fmt::format("{} samples are not finite, among those drawn for the verdict", verdict->nonfinite);
+  }
+  if (record.status == Status::ok && outcome.effort.overruns > 0) {
+    record.status = Status::error;
+    record.reason = fmt::format("{} walks exceeded the bound on lookups", outcome.effort.overruns);
   }
   if (record.status == Status::ok) record.verdict = verdict;
   write_images(record, prepared, *sampled, options, observer);

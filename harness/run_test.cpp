@@ -59,7 +59,7 @@ TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
 TEST(Run, AChannelThatIsNotFiniteTakesNothingFromTheOthers) {
   const Plan cells =
       read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
-      "samples_per_ray":64,"matrix":{"estimator":{"type":"residual_ratio","control":"average"},
+      "samples_per_ray":64,"matrix":{"estimator":{"type":"residual_ratio","control":"maximum","component":"residual"},
       "medium":[{"type":"linear","optical_depth":0.01,"spectrum":[1,1e6]},{"type":"linear","optical_depth":0.01,"spectrum":[1e6,1]}]}}]})",
                   "test.json");
   RunRecord results;

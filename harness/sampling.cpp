@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "harness/eight.h"
 
@@ -45,6 +46,7 @@ struct ChunkResult {
   std::vector<Real> lookups_squared;
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
+  Real largest = 0;
   std::map<std::size_t, Evidence> evidence;  ///< by test; a chunk touches few of them
   Clock::duration judging{}, statistics{}, working{};
 };
@@ -178,22 +180,31 @@ struct Scratch {
 /// Rounding allowed to samples at the ends of their declared range.
 constexpr Real kRangeSlack = 1e-9, kSingleRangeSlack = 1e-5;
 
-/// errors = values - reference; whether all values lie in [low, high], which none does that is not finite.
-bool subtract(const Real* values, Real reference, Real low, Real high, std::span<Real> errors) {
-  Eight value{};
+/// errors = values - reference; whether all values lie in [low, high], which none does that is not finite; then `largest` has
+/// grown to the largest of their magnitudes.
+bool subtract(const Real* values, Real reference, Real low, Real high, std::span<Real> errors, Real& largest) {
+  Eight value{}, most{}, least{};
   auto inside = value == value;
   std::size_t i = 0;
   for (; i + kEight <= errors.size(); i += kEight) {
     load(values + i, value);
     inside &= (value >= low) & (value <= high);
+    most = value > most ? value : most;
+    least = value < least ? value : least;
     store(value - reference, &errors[i]);
   }
   bool all = true;
-  for (std::size_t lane = 0; lane < kEight; ++lane) all &= inside[lane] != 0;
+  Real farthest = largest;
+  for (std::size_t lane = 0; lane < kEight; ++lane) {
+    all &= inside[lane] != 0;
+    farthest = std::max({farthest, most[lane], -least[lane]});
+  }
   for (; i < errors.size(); ++i) {
     all &= values[i] >= low && values[i] <= high;
     errors[i] = values[i] - reference;
+    farthest = std::max(farthest, std::abs(values[i]));
   }
+  if (all) largest = farthest;
   return all;
 }
 
@@ -271,7 +282,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         for (std::size_t i = 0; i < errors.size(); ++i) mine.finite[i] = values[i * outputs + o];
         drawn = mine.finite.data();
       }
-      if (subtract(drawn, reference, low, high, errors)) return errors;
+      if (subtract(drawn, reference, low, high, errors, out.largest)) return errors;
     }
     mine.finite.clear();
     for (std::size_t i = 0; i < errors.size(); ++i) {
@@ -282,6 +293,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         continue;
       }
       out.out_of_range += !(value >= low && value <= high);
+      out.largest = std::max(out.largest, std::abs(value));
       errors[i] = measured(value, cell.measurement) - reference;
       mine.finite.push_back(errors[i]);
     }
@@ -375,6 +387,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     result.counters += part.counters;
     result.nonfinite += part.nonfinite;
     result.out_of_range += part.out_of_range;
+    result.largest = std::max(result.largest, part.largest);
     result.statistics_seconds += std::chrono::duration<double>(part.statistics).count();
     result.judging_seconds += std::chrono::duration<double>(part.judging).count();
     result.working_seconds += std::chrono::duration<double>(part.working).count();
@@ -410,6 +423,7 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<The
   const std::size_t rays = scene.rays->local.size(), count = queries.size();
   const auto channels = static_cast<std::size_t>(scene.reference->channels);
   std::vector<Theory> all(rays * count * channels);
+  std::vector<Real> majorant_depth(rays);
   struct Memory {
     std::vector<std::unique_ptr<Workspace>> workspaces;
     RayContext context;
@@ -427,7 +441,11 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<The
       for (std::size_t k = 0; k < count; ++k) {
         const Kernel& kernel = *queries[k].kernel;
         scene.context(ray, kernel, mine.context);
-        if (!profile) profile.emplace(make_profile(medium, scene.rays->local[ray], mine.context.segments));
+        if (!profile) {
+          profile.emplace(make_profile(medium, scene.rays->local[ray], mine.context.segments));
+          for (const Segment& segment : mine.context.segments.segments)
+            majorant_depth[ray] += segment.majorant * (segment.end - segment.begin);
+        }
         kernel.begin_ray(*mine.workspaces[k], medium, scene.medium->extrema, mine.context);
         const std::vector<Theory> theory = kernel.theory(*mine.workspaces[k], *profile, queries[k].quantity);
         for (std::size_t c = 0; c < channels; ++c) all[(ray * count + k) * channels + c] = theory[c];
@@ -490,6 +508,7 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<The
       cell.ray_lookups_variance[ray] = theory.lookups_variance.value_or(0);
     }
     if (all_lookups) cell.lookups = lookups / n;
+    cell.majorant_depth = std::accumulate(majorant_depth.begin(), majorant_depth.end(), Real{0}) / n;
     if (!all_variances) cell.ray_variance.clear();
     if (!all_lookups) cell.ray_lookups.clear();
     if (!all_spreads) cell.ray_lookups_variance.clear();

@@ -21,6 +21,7 @@ struct Sampled {
   std::vector<BlockErrors> blocks;             ///< per output
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
+  Real largest = 0;                ///< max |X| of the finite samples
   std::vector<Evidence> evidence;  ///< one per test of the gate
   /// Of all threads: evidence alone; all that is done with samples once they are drawn; everything.
   double judging_seconds = 0, statistics_seconds = 0, working_seconds = 0;
@@ -48,6 +49,7 @@ struct CellTheory {
   std::vector<std::optional<Real>> squared_bias;  ///< per output, mean over rays of (mean - reference)^2
   std::vector<std::optional<Real>> bias;
   std::optional<Real> lookups;  ///< averaged over rays
+  Real majorant_depth = 0;      ///< averaged over rays: the lookups to reckon with where none are stated
   bool unit_weights = false;    ///< of a free path: its weight is always 1
   /// Per ray and output; empty where not known for all.  Variance of a sample; the estimator's own mean minus the target.
   std::vector<Real> ray_variance, ray_shift;

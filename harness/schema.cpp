@@ -254,6 +254,7 @@ Json cell_schema() {
        {"instructions", described(whole(0), "that drawing all samples took, counted in a simulator")},
        {"majorant_violations", whole(0)},
        {"largest_violation", described(nullable("number"), "extinction over majorant, where above 1")},
+       {"largest_sample", described(nullable("number"), "greatest absolute value of a finite sample, before any measurement")},
        {"nonfinite", whole(0)},
        {"verdict",
         {{"type", {"object", "null"}}, {"description", "evidence for and against the claims; see harness/verdict.md"}}},

@@ -7,16 +7,11 @@
 #include "harness/json_input.h"
 #include "harness/junit.h"
 #include "harness/results_json.h"
+#include "harness/table.h"
 #include "harness/verdict.h"
 #include "harness/verdict_json.h"
 
 namespace nullmark {
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) result += c == '|' ? "\\|" : std::string(1, c);
-  return result;
-}
 
 namespace {
 
@@ -110,6 +105,8 @@ std::string families(const RunRecord& run) {
 }
 
 }  // namespace
+
+std::string verdict_word(const CellRecord& record) { return word(kind_of(record)); }
 
 Summary summarise(RunRecord& run) {
   Summary summary;

@@ -24,8 +24,8 @@ struct Summary {
 /// or no cell that passed 77; else 0.
 Summary summarise(RunRecord& run);
 
-/// Text for a cell of a markdown table.
-std::string escaped(const std::string& text);
+/// The word that `check` counts a cell by: "PASS", "INCONCLUSIVE (as planned)".
+std::string verdict_word(const CellRecord& record);
 
 /// For the terminal: counts, then every cell that did not pass with its reason.
 std::string summary_text(const RunRecord& run, const Summary& summary);

@@ -43,7 +43,7 @@ std::string shown(const ChannelRecord& channel, const std::optional<Real>& value
 }
 
 /// What was proven: of the mean, and of the lookups where that is not a PASS.
-std::string verdict_word(const CellRecord& record) {
+std::string proven(const CellRecord& record) {
   if (!record.verdict) return "-";
   const VerdictRecord& verdict = *record.verdict;
   std::string word = to_string(verdict.unbiased);
@@ -72,7 +72,7 @@ Line channel_line(const CellRecord& record, std::size_t c) {
           once(metric(record, "ns_per_lookup")),
           once(record.time ? std::optional(record.time->floor_ratio) : std::nullopt),
           short_number(variance_x_ns(record, c)),
-          first ? verdict_word(record) : "",
+          first ? proven(record) : "",
           (first ? to_string(record.status) + (record.reason.empty() ? "" : ": " + record.reason) : std::string()) +
               (channel.reference || !channel.mean ? "" : fmt::format("{}mean {:.6g}", first ? ", " : "", *channel.mean))};
 }
@@ -164,6 +164,24 @@ std::string aligned(const std::vector<std::vector<std::string>>& lines, std::siz
     }
     row.erase(row.find_last_not_of(' ') + 1);
     text += row + "\n";
+  }
+  return text;
+}
+
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) result += c == '|' ? "\\|" : std::string(1, c);
+  return result;
+}
+
+std::string markdown_table(const std::vector<std::vector<std::string>>& lines) {
+  std::string text;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    for (const std::string& word : lines[i]) text += fmt::format("| {} ", escaped(word));
+    text += "|\n";
+    if (i > 0) continue;
+    for (std::size_t c = 0; c < lines[0].size(); ++c) text += "|---";
+    text += "|\n";
   }
   return text;
 }

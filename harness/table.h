@@ -16,6 +16,10 @@ std::string results_tables(const RunRecord& run);
 /// are set flush left, the others flush right.
 std::string aligned(const std::vector<std::vector<std::string>>& lines, std::size_t left);
 
+/// The same as a table of markdown, and text for one of its cells.
+std::string markdown_table(const std::vector<std::vector<std::string>>& lines);
+std::string escaped(const std::string& text);
+
 /// Four significant digits, "-" where there is no number.
 std::string short_number(const std::optional<Real>& number);
 

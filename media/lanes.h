@@ -53,6 +53,8 @@ class Lanes {
 
   friend Lanes smaller(Lanes a, Lanes b) { return hn::Min(a.vector_, b.vector_); }
   friend Lanes larger(Lanes a, Lanes b) { return hn::Max(a.vector_, b.vector_); }
+  friend Lanes magnitude(Lanes a) { return hn::Abs(a.vector_); }
+  friend Lanes signed_root(Lanes a) { return hn::CopySign(hn::Sqrt(hn::Abs(a.vector_)), a.vector_); }
   friend Lanes rounded_down(Lanes a) { return hn::Floor(a.vector_); }
   /// At most 1 ulp off.
   friend Lanes exponential(Lanes a) { return hn::Exp(Tag(), a.vector_); }
@@ -115,6 +117,9 @@ class LaneTruth {
   using Tag = hn::FixedTag<T, N>;
   hn::Vec<Tag> bits_;
 };
+
+template <std::size_t N>
+inline constexpr bool kInFloat<Lanes<float, N>> = true;
 
 template <class T, std::size_t N>
 struct Walking<Lanes<T, N>> {

@@ -56,6 +56,14 @@ inline Spectrum magnitude(const Spectrum& x) { return x.abs(); }
 
 inline Spectrum exponential(const Spectrum& x) { return x.exp(); }
 
+/// sgn(x) |x|^(1/2), and what undoes it.
+inline Real signed_root(Real x) { return std::copysign(std::sqrt(std::abs(x)), x); }
+inline Spectrum signed_root(const Spectrum& x) { return x.sign() * x.abs().sqrt(); }
+template <class Value>
+Value signed_square(const Value& x) {
+  return x * magnitude(x);
+}
+
 /// What one sample's distance, and its yes or no, are beside a Value: plain for grey and chromatic walks, and as many as there
 /// are lanes for walks in lanes.h.
 template <class Value>
@@ -67,6 +75,10 @@ template <class Value>
 using Distance = typename Walking<Value>::Distance;
 template <class Value>
 using Truth = typename Walking<Value>::Truth;
+
+/// Whether a Value's numbers are floats.
+template <class Value>
+inline constexpr bool kInFloat = false;
 
 /// `a` where `yes`, else `b`.
 inline Real select(bool yes, Real a, Real b) { return yes ? a : b; }
