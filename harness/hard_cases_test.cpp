@@ -143,8 +143,8 @@ TEST(HardCases, VoxelsOfAnySizeGiveTheSameTransmittance) {
     const std::string file = fmt::format("{}nullmark_voxels_{}_{}.vdb", ::testing::TempDir(), ::getpid(), voxel);
     openvdb::io::File(file).write({grid});
     const RunRecord run = run_of(read_config(
-        fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e","own_streams":false,
-            "rays":{{"type":"orthographic","width":4,"height":4,"axis":"y"}},"samples_per_ray":4096,
+        fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e",
+            "rays":{{"type":"orthographic","width":4,"height":4,"axis":"y"}},"samples_per_ray":4096,"gate":{{"epsilon":0.05,"max_samples_per_ray":1000000}},
             "matrix":{{"estimator":["regular","ratio","delta"],"majorant":["global",{{"type":"grid","resolution":4}}],
                        "medium":{{"type":"vdb","file":"{}","extinction_per_value":{}}}}}}}]}})",
                     file, 1 / voxel),
