@@ -271,8 +271,9 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
   }
   const std::uint64_t most = std::max(cell.samples_per_ray, cell.gate.max_samples_per_ray);
   gate.affordable = most;
-  if (cell.gate.max_lookups_per_ray && mean_lookups > 0)
-    gate.affordable = std::min(most, static_cast<std::uint64_t>(std::min(9e15, *cell.gate.max_lookups_per_ray / mean_lookups)));
+  const Real cost = theory.lookups.value_or(pilot ? pilot->lookups : 0);
+  if (cell.gate.max_lookups_per_ray && cost > 0)
+    gate.affordable = std::min(most, static_cast<std::uint64_t>(std::min(9e15, *cell.gate.max_lookups_per_ray / cost)));
   gate.affordable = std::max(gate.affordable, cell.samples_per_ray);
 
   std::optional<std::size_t> hardest;

@@ -76,6 +76,7 @@ struct Evidence {
 struct Pilot {
   std::vector<Real> variance;          ///< [ray * outputs + o]
   std::vector<Real> lookups_variance;  ///< per ray
+  Real lookups = 0;                    ///< of one sample
   Real variance_of_variance = 0;       ///< largest over outputs of sum d^4/(sum d^2)^2 - 1/n
 };
 
