@@ -236,7 +236,8 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
   const bool distrusted = !analytic && !bounded && pilot->variance_of_variance >= kTrustedVariance;
   std::vector<Pool> pools;
   const Real ulp = epsilon_of(cell.precision);
-  const Real mean_lookups = theory.lookups.value_or(theory.majorant_depth);
+  const Real mean_lookups = theory.lookups.value_or(
+      pilot && pilot->samples > 0 ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples) : theory.majorant_depth);
   for (std::size_t o = 0; o < outputs; ++o) {
     std::vector<Pool> by_group(static_cast<std::size_t>(groups) + 1);
     for (std::size_t ray = 0; ray < rays; ++ray) {

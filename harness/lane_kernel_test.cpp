@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "estimators/delta.h"
+#include "estimators/mis_unidirectional.h"
 #include "estimators/next_flight_delta.h"
 #include "estimators/next_flight_ratio.h"
 #include "estimators/published_next_flight_ratio.h"
@@ -166,6 +167,7 @@ TEST(Lanes, RatioTrackingIsTheSameAtEveryWidth) { compare_widths<RatioTracking>(
 TEST(Lanes, DeltaTrackingIsTheSameAtEveryWidth) { compare_widths<DeltaTracking>(kAsItIs); }
 TEST(Lanes, WeightedDeltaTrackingIsTheSameAtEveryWidth) { compare_widths<WeightedDeltaTracking>(kAsItIs); }
 TEST(Lanes, NextFlightRatioTrackingIsTheSameAtEveryWidth) { compare_widths<NextFlightRatioTracking>(kAsItIs); }
+TEST(Lanes, UnidirectionalMisIsTheSameAtEveryWidth) { compare_widths<UnidirectionalMis>(kAsItIs); }
 TEST(Lanes, NextFlightDeltaTrackingIsTheSameAtEveryWidth) {
   compare_widths<NextFlightDeltaTracking>(kAsItIs);
   compare_widths<NextFlightDeltaTracking>([](auto& estimator) { estimator.variant = "b"; });

@@ -47,7 +47,7 @@ class LawTester {
   }
 
   bool run(const LawBudget& budget, const std::function<bool()>& stop) {
-    const Real each = std::max<Real>(1, theory_.lookups.value_or(1));
+    const Real each = std::max<Real>(1, theory_.lookups.value_or(budget.each));
     const auto samples = static_cast<std::uint64_t>(
         std::clamp<Real>(budget.lookups / (each * static_cast<Real>(rays_.size())), 4, static_cast<Real>(budget.most_per_ray)));
     const std::uint64_t batch = std::clamp<std::uint64_t>(static_cast<std::uint64_t>(2e5 / each), 1, 256);

@@ -32,6 +32,7 @@ namespace nullmark {
 struct LawBudget {
   Real lookups = 2e5;                 ///< of all walks together, about
   std::uint64_t most_per_ray = 4096;  ///< samples
+  Real each = 1;                      ///< lookups of a sample, where theory does not tell
 };
 std::vector<LawRecord> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
                                  SampleRange range, const CellTheory& theory, const LawBudget& budget,

@@ -277,6 +277,10 @@ struct Families {
   std::uint64_t means = 1, lookups = 1, laws = 1;
 };
 
+Real lookups_of_a_sample(const Sampled& sampled) {
+  return static_cast<Real>(sampled.counters.lookups) / static_cast<Real>(std::max<std::uint64_t>(1, sampled.counters.samples));
+}
+
 /// Variances from samples of their own, where theory has none.
 std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function<bool()>& stop) {
   // Far beyond the samples of any verdict, so that the streams are others.
@@ -345,7 +349,7 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
   const bool violates = prepared.needs_bound && !prepared.scene->bounding, judged = gate.against == "reference" && !violates;
   if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !gate.undecidable.empty())))
     verdict.laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range,
-                             prepared.theory, {}, stop);
+                             prepared.theory, {.each = lookups_of_a_sample(sampled)}, stop);
   // Bins are coarse; where weights are 1 the distribution itself can be looked at.
   if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path && prepared.theory.unit_weights)
     for (const LawRecord& law : free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, {}, stop))

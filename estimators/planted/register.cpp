@@ -6,9 +6,11 @@
 #include "estimators/planted/decomposition.h"
 #include "estimators/planted/decomposition_reset.h"
 #include "estimators/planted/flight_rate.h"
+#include "estimators/planted/mis.h"
 #include "estimators/planted/moments.h"
 #include "estimators/planted/neighbour.h"
 #include "estimators/planted/next_flight.h"
+#include "estimators/planted/power_series.h"
 #include "estimators/planted/previous_lookup.h"
 #include "estimators/planted/rare_nan.h"
 #include "estimators/planted/roulette.h"
@@ -38,6 +40,8 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedFirstSegment);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedFlightRate);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedHeroHistory);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedLastSegment);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedLostEscape);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedLostWalks);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedNan);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedNeighbour, WrappedSource<PlantedNeighbour>);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedNoRewind);
@@ -51,6 +55,7 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedSecondLookup);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedSpectralSum);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedStaleResidual);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedStepParenthesis);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedStrictTail);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedTerminalTerm);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedWeightSign);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedWholeDepth);

@@ -83,6 +83,12 @@ inline constexpr PlantedScene kPlantedScenes[] = {
     {"planted_whole_depth", R"("planted_whole_depth")", kConstant, kTwice, kThroughTheBox, -0.399576},
     // (e + 1)/(2 e) - 1
     {"planted_terminal_term", R"("planted_terminal_term")", kConstant, kTwice, kThroughTheBox, -0.316060},
+    // 1/(1 + e^{-1}) - 1: all weight is gone after the first collision
+    {"planted_lost_escape", R"("planted_lost_escape")", kConstant, kBound, kThroughTheBox, -0.268941},
+    // e/(2 + e) - 1: only the pair of both ends is left
+    {"planted_lost_walks", R"("planted_lost_walks")", kConstant, kBound, kThroughTheBox, -0.423883},
+    // e^{-1} sum_i P(N >= i)/(i! P(N > i)) - 1, N of mean 2
+    {"planted_strict_tail", R"("planted_strict_tail")", kConstant, kTwice, kThroughTheBox, 0.433624},
     // e^{-1/2} - 1
     {"planted_control_twice", R"("planted_control_twice")", kRising, kBound, kThroughTheBox, -0.393469},
     // e^{3/8} - 1

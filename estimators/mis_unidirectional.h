@@ -1,0 +1,77 @@
+#pragma once
+
+#include "estimators/estimator.h"
+
+namespace nullmark {
+
+/// Unidirectional MIS of escape and next flight [Georgiev et al. 2019]: from each vertex of a ratio-tracking walk both "the
+/// flight leaves" and "count the chance that it leaves" are estimates of the same term, weighed by the balance heuristic.  With v
+/// = exp(- majorant depth left) and c = v/(1 + v), S = sum of W c over the origin and all tentative collisions, and W c once more
+/// where the flight leaves.  Unbiased for any rate, since in majorant depth every rate is 1 and only the null ratio 1 - mu/mub is
+/// left; (0, inf) where the majorant bounds.  Lookups int mub.
+template <class Value>
+struct UnidirectionalMis {
+  static constexpr const char* kName = "mis_unidirectional";
+  static constexpr const char* kSummary = "ratio tracking whose escape and next-flight estimates share the weight";
+  static constexpr const char* kSource = "Georgiev et al. 2019, unidirectional MIS";
+  static constexpr SampleRange kRange = SampleRange::non_negative;
+  static constexpr bool kNeedsBound = false;
+  static constexpr bool kLanes = true;
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Walk {
+    Value weight, last, sum;  ///< W, W c of the last vertex, sum of W c
+  };
+
+  void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
+    walk.weight = ray.value(1);
+    walk.last = walk.sum = walk.weight * share(flight.depth_left());
+  }
+
+  auto propose(Walk&, const auto&, auto& flight, auto& rng) const { return flight.next(rng); }
+
+  void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
+    walk.weight *= (at.rate() - extinction) / at.rate();
+    walk.last = walk.weight * share(at.depth_left());
+    walk.sum += walk.last;
+  }
+
+  Value result(const Walk& walk, const auto&) const { return walk.sum + walk.last; }
+
+  /// From a vertex, S = c + (c if the flight leaves, else a S of the next vertex), and the mean of the latter is T - c - v c, so
+  /// M2 = g(0) + int_0^d mub a^2 k g dy with g = c^2 + 2 c (T(y,d) - v) + 3 v c^2, a = 1 - mu/mub and k(y) = exp(-int_0^y (2 mu -
+  /// mu^2/mub)).  Nothing where the panels do not resolve v.
+  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int channel, Quantity) const {
+    Theory theory{.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
+    if (!profile.resolved()) return theory;
+    const Real tau = profile.optical_depth(channel), total = ray.majorant.total_depth();
+    const auto added = [&](Real depth_left, Real tau_left) {
+      const Real v = std::exp(-depth_left), c = v / (1 + v);
+      return c * (c + 2 * (std::exp(-tau_left) - v) + 3 * v * c);
+    };
+    const auto rate = [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); };
+    const auto lost = profile.running(channel, [&](const RayProfile::Node& at) {
+      return at.extinction > 0 ? 2 * at.extinction - at.extinction * at.extinction / rate(at) : 0;
+    });
+    const auto ahead = profile.running(channel, rate);
+    std::size_t j = 0;
+    const Real rest = profile.integrate(channel, [&](const RayProfile::Node& at) {
+      const Real k = std::exp(-lost[j]), depth_left = total - ahead[j];
+      ++j;
+      if (!(rate(at) > 0)) return Real{0};
+      const Real a = (rate(at) - at.extinction) / rate(at);
+      return rate(at) * a * a * k * added(depth_left, tau - at.depth);
+    });
+    theory.variance = std::max<Real>(0, added(total, tau) + rest - std::exp(-2 * tau));
+    return theory;
+  }
+
+ private:
+  static Distance<Value> share(const Distance<Value>& depth_left) {
+    const Distance<Value> v = exponential(-depth_left);
+    return v / (1 + v);
+  }
+};
+
+}  // namespace nullmark

@@ -1,0 +1,86 @@
+#pragma once
+
+#include "estimators/power_series.h"
+
+namespace nullmark {
+
+/// Power-series CMF estimator [Georgiev et al. 2019]: the first n0 terms beyond the zeroth are always summed, n0 the number of
+/// Poisson terms of mean M = int mub that hold .99 of all; then the walk goes on to term i with chance M/i, which divides it.  So
+/// P_i = 1 up to n0 and P_{i-1} M/i from there.  Unbiased for any rate, in (0, inf) where mub bounds; m1, m2 as in
+/// p_series_next_flight.h, and the same M2.  Lookups n0 + sum_{i>n0} P_i.  n0 is found from a table of the ray, not by adding up
+/// from e^{-M}, which underflows.
+template <class Value>
+struct PowerSeriesCmf {
+  static constexpr const char* kName = "p_series_cmf";
+  static constexpr const char* kSummary = "power series: all terms up to .99 of the Poisson law, then roulette";
+  static constexpr const char* kSource = "Georgiev et al. 2019, p-series CMF";
+  static constexpr SampleRange kRange = SampleRange::non_negative;
+  static constexpr bool kNeedsBound = false;
+  static constexpr bool kOwnFlights = true;
+
+  static constexpr Real kShare = 0.99;
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Ray : Passage<Value> {
+    PoissonTail tail;
+    std::int64_t always = 0;  ///< n0
+  };
+
+  void prepare(Ray& ray) const {
+    ray.tail.set_up(ray.majorant.total_depth());
+    ray.always = ray.majorant.total_depth() > 0 ? ray.tail.first_at_most(1 - kShare) : 0;
+  }
+
+  struct Walk {
+    SeriesSum<Value> series;
+    Real u = 0;  ///< uniform, given that the walk has come so far
+    std::int64_t lookups = 0;
+  };
+
+  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
+    walk.series.start(ray);
+    walk.u = rng.uniform();
+    walk.lookups = 0;
+  }
+
+  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+    if (++walk.lookups > ray.always) {
+      const Real chance = ray.majorant.total_depth() / static_cast<Real>(walk.lookups);
+      if (!(walk.u < chance)) return false;
+      walk.u /= chance;
+    }
+    land_anywhere(ray, flight, rng);
+    return true;
+  }
+
+  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto&) const {
+    const Real factor = walk.lookups > ray.always ? 1 : ray.majorant.total_depth() / static_cast<Real>(walk.lookups);
+    walk.series.multiply(factor * null_ratio(at, extinction));
+    walk.series.add();
+  }
+
+  Value result(const Walk& walk, const Ray&) const { return walk.series.total(); }
+
+  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+    const SeriesMoments moments = series_moments(ray, profile, c);
+    const auto always = static_cast<Real>(ray.always);
+    const auto log_growth = [&](std::int64_t n) {
+      const auto i = static_cast<Real>(n);
+      const Real log_chance =
+          n > ray.always ? (i - always) * std::log(moments.depth) - log_factorial(i) + log_factorial(always) : 0;
+      return i * std::log1p(moments.spread) - log_chance;
+    };
+    Real more = 0, squares = 0, chance = 1;
+    for (Real j = 1; chance > 1e-17; ++j) {
+      chance *= moments.depth / (always + j);
+      more += chance;
+      squares += (2 * j - 1) * chance;
+    }
+    return {.variance = series_variance(moments.depth, moments.first, log_growth, last_poisson_term(moments)),
+            .lookups = always + more,
+            .lookups_variance = std::max<Real>(0, squares - more * more)};
+  }
+};
+
+}  // namespace nullmark

@@ -1,0 +1,58 @@
+#pragma once
+
+#include "estimators/power_series.h"
+#include "estimators/ratio.h"
+
+namespace nullmark {
+
+/// Power-series ratio estimator [Georgiev et al. 2019]: the product of null ratios at N points, N a Poisson number of mean M =
+/// int mub and the points independent, of density mub/M.  That is ratio tracking without an order: the same law, so Var = T^2
+/// (exp(int mu^2/mub) - 1), lookups int mub, in [0,1] where mub bounds, unbiased for any rate.  No logarithm a step: the walk
+/// goes on while u < P(N >= i), one u for all.
+template <class Value>
+struct PowerSeriesRatio {
+  static constexpr const char* kName = "p_series_ratio";
+  static constexpr const char* kSummary = "power series: product of null ratios at a Poisson number of independent points";
+  static constexpr const char* kSource = "Georgiev et al. 2019, p-series ratio";
+  static constexpr SampleRange kRange = SampleRange::unit;
+  static constexpr bool kNeedsBound = false;
+  static constexpr bool kOwnFlights = true;
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Ray : Passage<Value> {
+    PoissonTail tail;
+  };
+
+  void prepare(Ray& ray) const { ray.tail.set_up(ray.majorant.total_depth()); }
+
+  struct Walk {
+    Value weight;
+    Real u = 0;
+    std::int64_t lookups = 0;
+  };
+
+  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const { walk = {ray.value(1), rng.uniform(), 0}; }
+
+  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+    if (!(walk.u < ray.tail.at_least(++walk.lookups))) return false;
+    land_anywhere(ray, flight, rng);
+    return true;
+  }
+
+  void consume(Walk& walk, const Ray&, const Flight& at, const Value& extinction, auto&) const {
+    walk.weight *= null_ratio(at, extinction);
+  }
+
+  Value result(const Walk& walk, const Ray&) const { return walk.weight; }
+
+  CountLaw count_law(const Ray& ray, const RayProfile& profile, int c) const {
+    return RatioTracking<Value>().count_law(ray, profile, c);
+  }
+
+  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity quantity) const {
+    return RatioTracking<Value>().theory(ray, profile, c, quantity);
+  }
+};
+
+}  // namespace nullmark
