@@ -21,7 +21,9 @@ void append_rule(Real a, Real b, std::vector<Real>& x, std::vector<Real>& w) {
   }
 }
 
-std::vector<Real> lookups(const RayProfile& profile, int c, const std::vector<Real>& t) {
+}  // namespace
+
+std::vector<Real> extinction_at(const RayProfile& profile, int c, const std::vector<Real>& t) {
   const auto channels = static_cast<std::size_t>(profile.channels());
   std::vector<Real> all(t.size() * channels), mu(t.size());
   profile.extinction(t.data(), t.size(), all.data());
@@ -29,36 +31,60 @@ std::vector<Real> lookups(const RayProfile& profile, int c, const std::vector<Re
   return mu;
 }
 
-}  // namespace
+Nodes stratum_nodes(const RayProfile& profile, int steps) {
+  const Real h = (profile.end() - profile.begin()) / steps;
+  Nodes nodes;
+  std::size_t cut = 0;
+  const auto cuts = profile.cuts();
+  for (int j = 0; j < steps; ++j) {
+    nodes.first.push_back(nodes.x.size());
+    Real a = profile.begin() + j * h;
+    const Real end = j + 1 == steps ? profile.end() : profile.begin() + (j + 1) * h;
+    while (a < end) {
+      while (cut < cuts.size() && cuts[cut] <= a) ++cut;
+      const Real b = cut < cuts.size() ? std::min(end, cuts[cut]) : end;
+      append_rule(a, b, nodes.x, nodes.w);
+      a = b;
+    }
+  }
+  nodes.first.push_back(nodes.x.size());
+  return nodes;
+}
+
+std::optional<Nodes> offset_nodes(const RayProfile& profile, Real steps, int parts) {
+  const Real h = (profile.end() - profile.begin()) / steps;
+  std::vector<Real> offsets{0, 1};
+  for (const Real cut : profile.cuts()) {
+    const Real in_steps = (cut - profile.begin()) / h;
+    offsets.push_back(in_steps - std::floor(in_steps));
+  }
+  std::sort(offsets.begin(), offsets.end());
+  offsets.erase(std::unique(offsets.begin(), offsets.end(), [](Real a, Real b) { return b - a < 1e-12; }), offsets.end());
+  constexpr Real kMostLookups = 200'000;
+  if (static_cast<Real>(offsets.size() * 10) * parts * steps > kMostLookups) return std::nullopt;
+  Nodes nodes;
+  for (std::size_t i = 0; i + 1 < offsets.size(); ++i) {
+    const Real width = offsets[i + 1] - offsets[i];
+    for (int part = 0; part < parts; ++part)
+      append_rule(offsets[i] + width * part / parts, part + 1 == parts ? offsets[i + 1] : offsets[i] + width * (part + 1) / parts,
+                  nodes.x, nodes.w);
+  }
+  return nodes;
+}
 
 Theory fixed_march(const RayProfile& profile, int c, int steps, Real offset, Quantity quantity) {
   const Real h = (profile.end() - profile.begin()) / steps;
   std::vector<Real> t(static_cast<std::size_t>(steps));
   for (std::size_t j = 0; j < t.size(); ++j) t[j] = profile.begin() + (static_cast<Real>(j) + offset) * h;
   Real sum = 0;
-  for (const Real mu : lookups(profile, c, t)) sum += mu;
+  for (const Real mu : extinction_at(profile, c, t)) sum += mu;
   return {.mean = quantity == Quantity::transmittance ? std::exp(-h * sum) : h * sum, .variance = 0};
 }
 
 Theory stratified_march(const RayProfile& profile, int c, int steps, Quantity quantity) {
   const Real h = (profile.end() - profile.begin()) / steps;
-  std::vector<Real> t, w;
-  std::vector<std::size_t> first;  // of each stratum
-  std::size_t cut = 0;
-  const auto cuts = profile.cuts();
-  for (int j = 0; j < steps; ++j) {
-    first.push_back(t.size());
-    Real a = profile.begin() + j * h;
-    const Real end = j + 1 == steps ? profile.end() : profile.begin() + (j + 1) * h;
-    while (a < end) {
-      while (cut < cuts.size() && cuts[cut] <= a) ++cut;
-      const Real b = cut < cuts.size() ? std::min(end, cuts[cut]) : end;
-      append_rule(a, b, t, w);
-      a = b;
-    }
-  }
-  first.push_back(t.size());
-  const std::vector<Real> mu = lookups(profile, c, t);
+  const auto [t, w, first] = stratum_nodes(profile, steps);
+  const std::vector<Real> mu = extinction_at(profile, c, t);
 
   // Var prod Y_j = prod E[Y_j]^2 (prod (1 + v_j) - 1), v_j the relative variance of one factor, in a form that does not cancel.
   Real log_mean = 0, log_growth = 0, tau = 0, tau_variance = 0;
@@ -85,22 +111,13 @@ Theory stratified_march(const RayProfile& profile, int c, int steps, Quantity qu
 
 Theory uniform_march(const RayProfile& profile, int c, int steps, Quantity quantity) {
   const Real h = (profile.end() - profile.begin()) / steps;
-  std::vector<Real> offsets{0, 1};
-  for (const Real cut : profile.cuts()) {
-    const Real in_steps = (cut - profile.begin()) / h;
-    offsets.push_back(in_steps - std::floor(in_steps));
-  }
-  std::sort(offsets.begin(), offsets.end());
-  offsets.erase(std::unique(offsets.begin(), offsets.end(), [](Real a, Real b) { return b - a < 1e-12; }), offsets.end());
-  constexpr std::size_t kMostLookups = 200'000;
-  if (offsets.size() * 10 * static_cast<std::size_t>(steps) > kMostLookups) return {};
-
-  std::vector<Real> u, w;
-  for (std::size_t i = 0; i + 1 < offsets.size(); ++i) append_rule(offsets[i], offsets[i + 1], u, w);
+  const auto nodes = offset_nodes(profile, steps);
+  if (!nodes) return {};
+  const std::vector<Real>&u = nodes->x, &w = nodes->w;
   std::vector<Real> t;
   for (const Real o : u)
     for (int j = 0; j < steps; ++j) t.push_back(profile.begin() + (j + o) * h);
-  const std::vector<Real> mu = lookups(profile, c, t);
+  const std::vector<Real> mu = extinction_at(profile, c, t);
   std::vector<Real> x(u.size());
   Real mean = 0;
   for (std::size_t i = 0; i < u.size(); ++i) {

@@ -63,7 +63,9 @@ void expect_agreement(const CellRecord& record) {
       EXPECT_NEAR(*channel.variance / *channel.variance_theory, 1, 0.05);
     }
   }
-  if (record.lookups_theory && *record.lookups_theory > 0) {
+  // The mean of so heavy a tail shows nothing; the law behind it is tested in debiased_test.cpp.
+  const bool infinite_variance = record.cell.estimator.type == "telescoping";
+  if (record.lookups_theory && *record.lookups_theory > 0 && !infinite_variance) {
     EXPECT_NEAR(*record.lookups_per_sample / *record.lookups_theory, 1, 0.01);
   }
 }
@@ -201,6 +203,7 @@ TEST(Contract, ViolatedMajorantsAreCounted) {
   for (const CellRecord& record : records) {
     const std::string& type = record.cell.estimator.type;
     if (type == "closed_form" || type == "regular" || type == "regular_inversion") continue;
+    if (type == "unbiased_ray_marching" || type == "telescoping") continue;  // no tentative collisions
     EXPECT_GT(record.majorant_violations, 0u) << record.cell.name;
     EXPECT_NEAR(*record.largest_violation, 1 / 0.9, 1e-2) << record.cell.name;
     ++audited;

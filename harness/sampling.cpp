@@ -500,9 +500,11 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<The
       cell.squared_bias.push_back(where_known(squared));
     }
     Real lookups = 0;
+    bool heavy = false;
     for (std::size_t ray = 0; ray < rays; ++ray) {
       const Theory& theory = all[(ray * count + k) * channels];
       all_lookups = all_lookups && finite(theory.lookups);
+      heavy = heavy || (theory.lookups_variance && std::isinf(*theory.lookups_variance));
       all_spreads = all_spreads && finite(theory.lookups_variance);
       lookups += cell.ray_lookups[ray] = theory.lookups.value_or(0);
       cell.ray_lookups_variance[ray] = theory.lookups_variance.value_or(0);
@@ -510,7 +512,8 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<The
     if (all_lookups) cell.lookups = lookups / n;
     cell.majorant_depth = std::accumulate(majorant_depth.begin(), majorant_depth.end(), Real{0}) / n;
     if (!all_variances) cell.ray_variance.clear();
-    if (!all_lookups) cell.ray_lookups.clear();
+    // Of infinite variance an expectation is told, not tested: no number of samples decides it.
+    if (!all_lookups || heavy) cell.ray_lookups.clear();
     if (!all_spreads) cell.ray_lookups_variance.clear();
   }
   return result;
