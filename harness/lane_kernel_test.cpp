@@ -58,11 +58,11 @@ std::shared_ptr<const Medium> volume() {
   };
   data->values = BrickGrid::build(
       {Index3::Constant(0), Index3::Constant(31)}, 0.f,
+      [](const Index3&, const auto& shape, const auto& visit) { visit(0, shape[0] * shape[1] * shape[2], nullptr); },
       [&](const Index3& at, float* out) {
         for (int i = 0; i <= 8; ++i)
           for (int j = 0; j <= 8; ++j)
             for (int k = 0; k <= 8; ++k) *out++ = std::max(0.f, value(at[0] + i, at[1] + j, at[2] + k));
-        return true;
       },
       [](std::size_t n, const auto& body) {
         for (std::size_t i = 0; i < n; ++i) body(i);

@@ -43,6 +43,23 @@ Index3 BrickGrid::origin(std::size_t table_index) const {
          kSide * Index3(static_cast<int>(ij / shape_[1]), static_cast<int>(ij % shape_[1]), static_cast<int>(k));
 }
 
+BrickGrid::Pattern BrickGrid::uncut(const Corners& corners) {
+  Pattern pattern{};
+  std::transform(corners.begin(), corners.end(), pattern.begin(), [](float v) { return std::bit_cast<std::uint32_t>(v); });
+  for (std::size_t axis = 0; axis < 3; ++axis) pattern[9 + 2 * axis] = kSide;
+  return pattern;
+}
+
+BrickGrid::Pattern BrickGrid::cut(const Corners& corners, const Index3& origin) const {
+  Pattern pattern = uncut(corners);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    pattern[8 + 2 * a] = static_cast<std::uint32_t>(std::max(box_.lo[axis] - origin[axis], 0));
+    pattern[9 + 2 * a] = static_cast<std::uint32_t>(std::min(box_.hi[axis] - origin[axis], kSide));
+  }
+  return pattern;
+}
+
 void BrickGrid::clear_outside(const Index3& origin, float* values) const {
   if (box_.contains({origin, origin + Index3::Constant(kSide)})) return;
   for (int i = 0; i < kStride; ++i)
@@ -78,6 +95,22 @@ void BrickGrid::store(std::size_t brick, const float* values) {
         summary.maximum = std::max(summary.maximum, v);
         summary.sum += v;
       }
+}
+
+void BrickGrid::store(std::size_t brick, const Pattern& pattern) {
+  const auto in_box = [&](std::size_t axis, int at) {
+    const auto n = static_cast<std::uint32_t>(at);
+    return pattern[8 + 2 * axis] <= n && n <= pattern[9 + 2 * axis];
+  };
+  std::array<float, kBrickValues> values;
+  auto value = values.begin();
+  for (int i = 0; i < kStride; ++i)
+    for (int j = 0; j < kStride; ++j)
+      for (int k = 0; k < kStride; ++k) {
+        const std::size_t corner = (i == kSide ? 4u : 0u) + (j == kSide ? 2u : 0u) + (k == kSide ? 1u : 0u);
+        *value++ = in_box(0, i) && in_box(1, j) && in_box(2, k) ? std::bit_cast<float>(pattern[corner]) : background_;
+      }
+  store(brick, values.data());
 }
 
 std::size_t BrickGrid::bytes() const {

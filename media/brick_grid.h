@@ -1,14 +1,17 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <climits>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <stdexcept>
-#include <unordered_map>
 #include <vector>
 
 #include "media/lanes.h"
+#include "media/zeroed_pages.h"
 
 namespace nullmark {
 
@@ -51,8 +54,8 @@ inline std::uint64_t hash_mixed(std::uint64_t hash, std::uint64_t word) {
 /// Sparse voxel values, answered without a tree walk: a dense table over the box, in bricks of 8^3 voxels aligned to multiples
 /// of 8, tells each brick's values.  A brick stores 9^3 floats, its own voxels and one layer (the apron) of its upper
 /// neighbours, so that the 8 taps of a trilinear lookup lie in one brick, at 9^3 / 8^3 = 1.42 times the memory.  Bricks of one
-/// value share their storage.  Voxels outside the box hold the background.  Voxel centres are at integer coordinates, as in
-/// OpenVDB.
+/// value share their storage, and the table costs memory only around what is not background.  Voxels outside the box hold the
+/// background.  Voxel centres are at integer coordinates, as in OpenVDB.
 class BrickGrid {
  public:
   static constexpr int kSide = 8;
@@ -68,12 +71,17 @@ class BrickGrid {
   /// One background value everywhere.
   explicit BrickGrid(float background = 0) : background_(background) {}
 
-  /// `fill(origin, values)` writes the voxels origin + (i, j, k), 0 <= i, j, k <= 8, to values[(i * 9 + j) * 9 + k], or returns
-  /// false where all of them are background, which saves most of the time where few voxels span a large box;
-  /// `for_each(n, body)` calls body(0) ... body(n - 1), in any order or concurrently.  Throws std::length_error, before
-  /// allocating, where the box or its values exceed the limits above.
-  template <class Fill, class ForEach>
-  static BrickGrid build(const IndexBox& box, float background, const Fill& fill, const ForEach& for_each);
+  /// The one value of a brick, and the ones of its upper neighbours: brick + (x, y, z) at 4 x + 2 y + z.
+  using Corners = std::array<float, 8>;
+
+  /// What is not background, and nothing else costs more than a look at the table: `bricks(first, shape, visit)` calls
+  /// visit(begin, end, corners) for stretches of the table - brick first + (i, j, k) has the place (i shape[1] + j) shape[2] + k
+  /// - each brick at most once.  Where the bricks of a stretch of one row and their upper neighbours have but one value each, the
+  /// same all along, `corners` tells them; else it is null and `fill(origin, values)` writes the voxels origin + (i, j, k), 0 <=
+  /// i, j, k <= 8, to values[(i * 9 + j) * 9 + k].  `for_each(n, body)` calls body(0) ... body(n - 1), in any order or
+  /// concurrently.  Throws std::length_error, before allocating, where the box or its values exceed the limits above.
+  template <class Bricks, class Fill, class ForEach>
+  static BrickGrid build(const IndexBox& box, float background, const Bricks& bricks, const Fill& fill, const ForEach& for_each);
 
   float background() const { return background_; }
   const IndexBox& box() const { return box_; }
@@ -126,6 +134,10 @@ class BrickGrid {
     Real sum;
   };
 
+  /// What bricks that share their storage have in common: the bits of their corners, then the first and the last of their voxels
+  /// that lie in the box, axis by axis, 0 to 8.
+  using Pattern = std::array<std::uint32_t, 14>;
+
   static constexpr std::array<int, 3> kSteps{kStride * kStride, kStride, 1};
 
   BrickGrid(const IndexBox& box, float background);
@@ -146,16 +158,21 @@ class BrickGrid {
   }
 
   Index3 origin(std::size_t table_index) const;
+  /// Of the table's first brick, in bricks.
+  Index3 first() const { return Index3(table_lo_[0], table_lo_[1], table_lo_[2]) / kSide; }
+  static Pattern uncut(const Corners& corners);
+  Pattern cut(const Corners& corners, const Index3& origin) const;
   void clear_outside(const Index3& origin, float* values) const;
   void allocate(std::int64_t bricks);
   void store(std::size_t brick, const float* values);
+  void store(std::size_t brick, const Pattern& pattern);
 
   float background_ = 0;
   IndexBox box_;
   // Whole bricks around the box, one voxel wider below, where the lowest voxels are upper taps; half open.
   std::array<int, 3> table_lo_{}, table_hi_{};
   std::array<std::size_t, 3> shape_{};
-  std::vector<std::uint32_t> table_;
+  std::vector<std::uint32_t, ZeroedPages<std::uint32_t>> table_;  ///< 0: background
   std::vector<float> values_;
   std::vector<BrickSummary> summaries_;
 };
@@ -211,58 +228,79 @@ Lanes<T, N> BrickGrid::trilinear(Lanes<T, N> x, Lanes<T, N> y, Lanes<T, N> z) co
   return select(inside, mix(face(0), face(kSteps[0]), x), Pack(background_));
 }
 
-template <class Fill, class ForEach>
-BrickGrid BrickGrid::build(const IndexBox& box, float background, const Fill& fill, const ForEach& for_each) {
+template <class Bricks, class Fill, class ForEach>
+BrickGrid BrickGrid::build(const IndexBox& box, float background, const Bricks& bricks, const Fill& fill,
+                           const ForEach& for_each) {
   BrickGrid grid(box, background);
+  const auto uniform = [](float value) {
+    Corners corners;
+    corners.fill(value);
+    return uncut(corners);
+  };
+  std::map<Pattern, std::uint32_t> shared{{uniform(background), 0}};
+  std::uint32_t count = 1;
+  const auto share = [&](const Pattern& pattern) {
+    const auto [found, added] = shared.try_emplace(pattern, count);
+    count += added;
+    return found->second;
+  };
+
+  std::vector<std::size_t> filled;
+  bricks(grid.first(), grid.shape_, [&](std::size_t begin, std::size_t end, const Corners* corners) {
+    if (!corners) {
+      for (std::size_t b = begin; b < end; ++b) filled.push_back(b);
+      return;
+    }
+    // Only the ends of a row are cut by the box in ways of their own.
+    Index3 at = grid.origin(begin);
+    for (std::size_t b = begin; b < end; ++b, at[2] += kSide) {
+      const bool as_before = b > begin && at[2] - kSide >= box.lo[2] && at[2] + kSide <= box.hi[2];
+      grid.table_[b] = as_before ? grid.table_[b - 1] : share(grid.cut(*corners, at));
+    }
+  });
+
   using Values = std::array<float, kBrickValues>;
   const auto load = [&](std::size_t b, Values& values) {
     const Index3 at = grid.origin(b);
-    if (!fill(at, values.data())) return false;
+    fill(at, values.data());
     grid.clear_outside(at, values.data());
-    return true;
   };
-
-  // First pass: the one value of each brick, or NaN.  Counting before storing allocates exactly once.
-  constexpr float kVaried = std::numeric_limits<float>::quiet_NaN();
-  std::vector<float> uniform(grid.table_.size());
-  for_each(uniform.size(), [&](std::size_t b) {
+  // The one value of each brick, or NaN.  Counting before storing allocates exactly once.
+  std::vector<float> only(filled.size());
+  for_each(filled.size(), [&](std::size_t n) {
     Values values;
-    if (!load(b, values)) {
-      uniform[b] = background;
-      return;
-    }
-    const bool same = std::all_of(values.begin(), values.end(), [&](float v) { return v == values[0]; });
-    uniform[b] = same ? values[0] : kVaried;
+    load(filled[n], values);
+    const auto bits = [](float v) { return std::bit_cast<std::uint32_t>(v); };
+    const bool same = std::all_of(values.begin(), values.end(), [&](float v) { return bits(v) == bits(values[0]); });
+    only[n] = same ? values[0] : std::numeric_limits<float>::quiet_NaN();
   });
+  for (std::size_t n = 0; n < filled.size(); ++n)
+    grid.table_[filled[n]] = std::isnan(only[n]) ? count++ : share(uniform(only[n]));
 
-  std::unordered_map<float, std::uint32_t> shared;
-  std::uint32_t bricks = 0;
-  for (std::size_t b = 0; b < uniform.size(); ++b)
-    grid.table_[b] = std::isnan(uniform[b]) || shared.try_emplace(uniform[b], bricks).second ? bricks++ : shared[uniform[b]];
-
-  grid.allocate(bricks);
-  for (const auto& [value, brick] : shared) {
+  grid.allocate(count);
+  for (const auto& [pattern, brick] : shared) grid.store(brick, pattern);
+  for_each(filled.size(), [&](std::size_t n) {
+    if (!std::isnan(only[n])) return;
     Values values;
-    values.fill(value);
-    grid.store(brick, values.data());
-  }
-  for_each(uniform.size(), [&](std::size_t b) {
-    if (!std::isnan(uniform[b])) return;
-    Values values;
-    if (!load(b, values)) values.fill(background);
-    grid.store(grid.table_[b], values.data());
+    load(filled[n], values);
+    grid.store(grid.table_[filled[n]], values.data());
   });
   return grid;
 }
 
 template <class Predicate>
 std::optional<Index3> BrickGrid::find(const Predicate& predicate) const {
+  // What is stored is looked at once, however many places of the table share it.
+  std::vector<char> holds(summaries_.size());
+  for (std::size_t brick = 0; brick < holds.size(); ++brick) {
+    const float* const values = values_.data() + brick * kBrickValues;
+    holds[brick] = std::any_of(values, values + kBrickValues, predicate);
+  }
+  if (std::find(holds.begin(), holds.end(), 1) == holds.end()) return std::nullopt;
   std::optional<Index3> first;
   for (std::size_t b = 0; b < table_.size(); ++b) {
-    const BrickSummary& all = summaries_[table_[b]];
+    if (!holds[table_[b]]) continue;
     const float* const values = values_.data() + std::size_t{table_[b]} * kBrickValues;
-    // One look settles a brick of one value; NaN compares unequal.
-    if (all.minimum == all.maximum && all.sum == Real{all.minimum} * kSide * kSide * kSide && !predicate(all.minimum)) continue;
     const Index3 low = origin(b);
     for (int i = 0; i < kSide; ++i)
       for (int j = 0; j < kSide; ++j)
@@ -324,6 +362,10 @@ RangeSummary BrickGrid::summary(const IndexBox& range, const Weights& weights, R
       for (std::size_t k = 0; k < stretches[2].size(); ++k) {
         const Stretch &x = stretches[0][i], &y = stretches[1][j], &z = stretches[2][k];
         const std::size_t brick = table_[((first[0] + i) * shape_[1] + first[1] + j) * shape_[2] + first[2] + k];
+        if (brick == 0) {
+          outside = true;
+          continue;
+        }
         const BrickSummary& all = summaries_[brick];
         const Real w = x.total * y.total * z.total;
         covered += w;

@@ -20,9 +20,11 @@ BrickGrid make(const IndexBox& box, float background, const Voxels& voxels) {
     for (int i = 0; i <= 8; ++i)
       for (int j = 0; j <= 8; ++j)
         for (int k = 0; k <= 8; ++k) *values++ = voxels(origin[0] + i, origin[1] + j, origin[2] + k);
-    return true;
   };
-  return BrickGrid::build(box, background, fill, serial);
+  const auto bricks = [](const Index3&, const auto& shape, const auto& visit) {
+    visit(0, shape[0] * shape[1] * shape[2], nullptr);
+  };
+  return BrickGrid::build(box, background, bricks, fill, serial);
 }
 
 /// Distinct for every voxel near the origin.
@@ -147,6 +149,32 @@ TEST(BrickGrid, BricksOfOneValueShareStorage) {
   EXPECT_EQ(grid.trilinear(199.25, 200, 200), 0.25);
   const BrickGrid one = make({{0, 0, 0}, {79, 79, 79}}, 0, numbered);
   EXPECT_LT(one.bytes(), 88u * 88 * 88 * sizeof(float) * 3 / 2);
+}
+
+/// A step between two values, across the third axis and along the others, in a box that cuts bricks on every side.
+TEST(BrickGrid, BricksKnownByTheirCornersAreTheSame) {
+  const IndexBox box{{-21, 3, -5}, {18, 30, 61}};
+  const auto value = [](int k) { return k < 16 ? 0.5f : k < 48 ? 2.f : 0.25f; };
+  const auto bricks = [&](const Index3& first, const auto& shape, const auto& visit) {
+    const int lowest = first[2], bricks_up = static_cast<int>(shape[2]);
+    for (std::size_t row = 0; row < shape[0] * shape[1]; ++row)
+      for (int k = 0, end; k < bricks_up; k = end) {
+        const auto values = [&](int at) { return std::pair(value(8 * (lowest + at)), value(8 * (lowest + at + 1))); };
+        for (end = k + 1; end < bricks_up && values(end) == values(k);) ++end;
+        const auto [own, next] = values(k);
+        const BrickGrid::Corners corners{own, next, own, next, own, next, own, next};
+        const std::size_t begin = row * shape[2];
+        visit(begin + static_cast<std::size_t>(k), begin + static_cast<std::size_t>(end), &corners);
+      }
+  };
+  const auto never = [](const Index3&, float*) { FAIL() << "nothing is left to ask for"; };
+  const BrickGrid known = BrickGrid::build(box, 0.25f, bricks, never, serial);
+  const BrickGrid asked = make(box, 0.25f, [&](int, int, int k) { return value(k); });
+  EXPECT_EQ(known.content_hash(), asked.content_hash());
+  for (int i = -24; i < 24; ++i)
+    for (int j = 0; j < 40; ++j)
+      for (int k = -16; k < 72; ++k) ASSERT_EQ(known.value(i, j, k), asked.value(i, j, k)) << i << ' ' << j << ' ' << k;
+  EXPECT_LT(known.bytes(), asked.bytes() / 2);
 }
 
 TEST(BrickGrid, HashTellsValuesBoxAndBackgroundApart) {

@@ -56,100 +56,129 @@ class FlatVoxels {
     tiles_ = leaves_ + leaf_count_ * sizeof(FlatLeaf);
   }
 
-  /// To be called once the box is known to be of a size that memory can hold.  Every brick has one owner, so the time this takes
-  /// is bounded by the box and the answer's size, whatever the tiles say.
-  void index() {
-    std::size_t bricks = 1;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<std::size_t>(axis);
-      first_[a] = brick_of(box_.lo[axis]);
-      shape_[a] = static_cast<std::size_t>(brick_of(box_.hi[axis]) - first_[a] + 1);
-      bricks *= shape_[a];
+  /// As BrickGrid::build asks for them, once the box is known to be of a size that its table can have.
+  template <class Visit>
+  void bricks(const Index3& first, const std::array<std::size_t, 3>& shape, const Visit& visit) {
+    index(first, shape);
+    for (std::size_t i = 0; i < shape[0]; ++i)
+      for (std::size_t j = 0; j < shape[1]; ++j) {
+        const std::size_t row = (i * shape[1] + j) * shape[2];
+        const std::array<const std::uint32_t*, 4> rows{&owner_at(i, j, 0), &owner_at(i, j + 1, 0), &owner_at(i + 1, j, 0),
+                                                       &owner_at(i + 1, j + 1, 0)};
+        Owners owners{};
+        std::size_t begin = 0;
+        for (std::size_t k = 0; k < shape[2]; ++k) {
+          const Owners here{rows[0][k], rows[0][k + 1], rows[1][k], rows[1][k + 1],
+                            rows[2][k], rows[2][k + 1], rows[3][k], rows[3][k + 1]};
+          if (here == owners) continue;
+          visit_stretch(row + begin, row + k, owners, visit);
+          owners = here;
+          begin = k;
+        }
+        visit_stretch(row + begin, row + shape[2], owners, visit);
+      }
+  }
+
+  /// As BrickGrid::build asks for it.
+  void fill(const Index3& origin, float* values) const {
+    constexpr int n = BrickGrid::kSide, stride = BrickGrid::kStride;
+    const Index3 at = origin / n - first_;
+    for (int corner = 0; corner < 8; ++corner) {
+      const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
+      const std::uint32_t owner =
+          owner_at(static_cast<std::size_t>(at[0] + x), static_cast<std::size_t>(at[1] + y), static_cast<std::size_t>(at[2] + z));
+      const std::byte* const voxels =
+          is_leaf(owner) ? leaves_ + (owner - 1) * sizeof(FlatLeaf) + offsetof(FlatLeaf, values) : nullptr;
+      // The brick itself, or the one layer of its neighbours that is the apron.
+      const int wide = z ? 1 : n;
+      for (int i = 0; i < (x ? 1 : n); ++i)
+        for (int j = 0; j < (y ? 1 : n); ++j) {
+          float* const row = values + ((i + n * x) * stride + j + n * y) * stride + n * z;
+          if (voxels)
+            std::memcpy(row, voxels + static_cast<std::size_t>((i * n + j) * n) * sizeof(float),
+                        static_cast<std::size_t>(wide) * sizeof(float));
+          else
+            std::fill(row, row + wide, one_value(owner));
+        }
     }
-    owner_.assign(bricks, 0);
+  }
+
+ private:
+  using Owners = std::array<std::uint32_t, 8>;
+
+  /// Every brick has one owner, so the time this takes is bounded by the answer's size and the bricks of its tiles.
+  void index(const Index3& first, const std::array<std::size_t, 3>& shape) {
+    first_ = first;
+    shape_ = shape;
+    // One more on every axis, for the upper neighbours of the last.
+    owner_.resize((shape[0] + 1) * (shape[1] + 1) * (shape[2] + 1));
     for (std::size_t n = 0; n < leaf_count_; ++n) {
-      const auto origin = taken<std::array<std::int32_t, 3>>(leaves_ + n * sizeof(FlatLeaf));
+      std::int32_t origin[3];
+      std::memcpy(origin, leaves_ + n * sizeof(FlatLeaf), sizeof origin);
       claim(origin, BrickGrid::kSide, n + 1);
     }
     for (std::size_t n = 0; n < tile_count_; ++n) {
       const auto tile = taken<FlatTile>(tiles_ + n * sizeof(FlatTile));
       if (tile.side != 8 && tile.side != 128 && tile.side != 4096)
         throw Inconsistent(fmt::format("a tile of {} voxels", tile.side));
-      claim({tile.origin[0], tile.origin[1], tile.origin[2]}, tile.side, leaf_count_ + n + 1);
+      claim(tile.origin, tile.side, leaf_count_ + n + 1);
       // One in a large tile would make every brick of it one of its own.
       if (unusable(tile.value))
         refuse_voxel(Index3(tile.origin[0], tile.origin[1], tile.origin[2]).cwiseMax(box_.lo), tile.value, header_);
     }
   }
 
-  /// As BrickGrid::build asks for it.
-  bool fill(const Index3& origin, float* values) const {
-    std::array<std::uint32_t, 8> owners{};
-    for (unsigned corner = 0; corner < 8; ++corner)
-      owners[corner] = owner_at(brick_of(origin[0]) + (corner >> 2), brick_of(origin[1]) + (corner >> 1 & 1),
-                                brick_of(origin[2]) + (corner & 1));
-    if (std::all_of(owners.begin(), owners.end(), [](std::uint32_t owner) { return owner == 0; })) return false;
-    constexpr int n = BrickGrid::kSide, stride = BrickGrid::kStride;
-    for (int corner = 0; corner < 8; ++corner) {
-      const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
-      const std::uint32_t owner = owners[static_cast<std::size_t>(corner)];
-      const bool leaf = owner != 0 && owner <= leaf_count_;
-      const std::byte* const voxels = leaf ? leaves_ + (owner - 1) * sizeof(FlatLeaf) + offsetof(FlatLeaf, values) : nullptr;
-      const float tile = owner == 0 ? header_.background
-                         : leaf     ? 0
-                                : taken<float>(tiles_ + (owner - leaf_count_ - 1) * sizeof(FlatTile) + offsetof(FlatTile, value));
-      // The brick itself, or the one layer of its neighbours that is the apron.
-      const int wide = z ? 1 : n;
-      for (int i = 0; i < (x ? 1 : n); ++i)
-        for (int j = 0; j < (y ? 1 : n); ++j) {
-          float* const row = values + ((i + n * x) * stride + j + n * y) * stride + n * z;
-          if (leaf)
-            std::memcpy(row, voxels + static_cast<std::size_t>((i * n + j) * n) * sizeof(float),
-                        static_cast<std::size_t>(wide) * sizeof(float));
-          else
-            std::fill(row, row + wide, tile);
-        }
+  template <class Visit>
+  void visit_stretch(std::size_t begin, std::size_t end, const Owners& owners, const Visit& visit) const {
+    if (begin == end || owners == Owners{}) return;
+    if (std::any_of(owners.begin(), owners.end(), [&](std::uint32_t owner) { return is_leaf(owner); })) {
+      visit(begin, end, nullptr);
+      return;
     }
-    return true;
+    BrickGrid::Corners corners;
+    std::transform(owners.begin(), owners.end(), corners.begin(), [&](std::uint32_t owner) { return one_value(owner); });
+    visit(begin, end, &corners);
   }
 
- private:
   static std::int64_t brick_of(std::int64_t voxel) { return voxel >> std::bit_width(BrickGrid::kSide - 1u); }
 
-  std::uint32_t owner_at(std::int64_t i, std::int64_t j, std::int64_t k) const {
-    // Bricks below the first wrap round to large numbers.
-    const auto u = static_cast<std::uint64_t>(i - first_[0]), v = static_cast<std::uint64_t>(j - first_[1]),
-               w = static_cast<std::uint64_t>(k - first_[2]);
-    return u < shape_[0] && v < shape_[1] && w < shape_[2] ? owner_[(u * shape_[1] + v) * shape_[2] + w] : 0;
+  bool is_leaf(std::uint32_t owner) const { return owner != 0 && owner <= leaf_count_; }
+
+  /// Of background or a tile.
+  float one_value(std::uint32_t owner) const {
+    return owner == 0 ? header_.background
+                      : taken<float>(tiles_ + (owner - leaf_count_ - 1) * sizeof(FlatTile) + offsetof(FlatTile, value));
   }
 
-  void claim(const std::array<std::int32_t, 3>& origin, int side, std::size_t owner) {
+  const std::uint32_t& owner_at(std::size_t i, std::size_t j, std::size_t k) const {
+    return owner_[(i * (shape_[1] + 1) + j) * (shape_[2] + 1) + k];
+  }
+
+  void claim(const std::int32_t (&origin)[3], int side, std::size_t owner) {
+    if (!meets(box_, origin, side)) throw Inconsistent("a leaf or tile lies outside the box of its grid");
     std::array<std::size_t, 3> begin{}, end{};
     for (std::size_t a = 0; a < 3; ++a) {
       if (origin[a] % side != 0) throw Inconsistent(fmt::format("a cube of {} voxels begins at {}", side, origin[a]));
-      const std::int64_t lo = std::max(brick_of(origin[a]) - first_[a], std::int64_t{0});
-      const std::int64_t hi =
-          std::min(brick_of(std::int64_t{origin[a]} + side) - first_[a], static_cast<std::int64_t>(shape_[a]));
-      if (lo >= hi) throw Inconsistent("a leaf or tile lies outside the box of its grid");
-      begin[a] = static_cast<std::size_t>(lo);
-      end[a] = static_cast<std::size_t>(hi);
+      const std::int64_t first = first_[static_cast<int>(a)];
+      begin[a] = static_cast<std::size_t>(std::max(brick_of(origin[a]) - first, std::int64_t{0}));
+      end[a] = std::min(static_cast<std::size_t>(brick_of(std::int64_t{origin[a]} + side) - first), shape_[a]);
     }
     for (std::size_t i = begin[0]; i < end[0]; ++i)
-      for (std::size_t j = begin[1]; j < end[1]; ++j)
-        for (std::size_t k = begin[2]; k < end[2]; ++k) {
-          std::uint32_t& place = owner_[(i * shape_[1] + j) * shape_[2] + k];
-          if (place != 0) throw Inconsistent("leaves or tiles overlap");
-          place = static_cast<std::uint32_t>(owner);
-        }
+      for (std::size_t j = begin[1]; j < end[1]; ++j) {
+        std::uint32_t* const row = owner_.data() + (i * (shape_[1] + 1) + j) * (shape_[2] + 1);
+        if (std::any_of(row + begin[2], row + end[2], [](std::uint32_t place) { return place != 0; }))
+          throw Inconsistent("leaves or tiles overlap");
+        std::fill(row + begin[2], row + end[2], static_cast<std::uint32_t>(owner));
+      }
   }
 
   const FlatHeader& header_;
   const std::byte *leaves_, *tiles_ = nullptr;
   std::size_t leaf_count_, tile_count_ = 0;
   IndexBox box_;
-  std::array<std::int64_t, 3> first_{};
+  Index3 first_ = Index3::Zero();  ///< brick of the table, which is BrickGrid's but for one more on every axis
   std::array<std::size_t, 3> shape_{};
-  std::vector<std::uint32_t> owner_;  ///< 0: background; then leaves, then tiles, counted from 1
+  std::vector<std::uint32_t, ZeroedPages<std::uint32_t>> owner_;  ///< 0: background; then leaves, then tiles, counted from 1
 };
 
 std::uint64_t content_hash(const BrickGrid& values, const Affine& map) {
@@ -174,16 +203,12 @@ VolumeData volume(std::span<const std::byte> answer, const FlatHeader& header) {
   if (unusable(header.background)) refuse_value("its background is", header.background, header);
   const IndexBox box = data.active.dilated(1);
   FlatVoxels voxels(answer, header, box);
-  bool indexed = false;
   try {
     data.values = BrickGrid::build(
-        box, header.background, [&](const Index3& origin, float* values) { return voxels.fill(origin, values); },
-        [&](std::size_t n, const auto& body) {
-          // By now the box has passed BrickGrid's limits.
-          if (!indexed) voxels.index();
-          indexed = true;
-          tbb::parallel_for(std::size_t{0}, n, body);
-        });
+        box, header.background,
+        [&](const Index3& first, const auto& shape, const auto& visit) { voxels.bricks(first, shape, visit); },
+        [&](const Index3& origin, float* values) { voxels.fill(origin, values); },
+        [](std::size_t n, const auto& body) { tbb::parallel_for(std::size_t{0}, n, body); });
   } catch (const std::length_error& error) {
     throw UnusableGrid(fmt::format("{}; crop or resample the grid", error.what()));
   }

@@ -1,8 +1,10 @@
 #include "media/flat_volume.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstring>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <random>
@@ -75,6 +77,43 @@ TEST(FlatVolume, LeavesTilesAndBackgroundBecomeVoxels) {
   EXPECT_EQ(data.grid_class, "fog volume");
   EXPECT_EQ(data.voxel_size, Vec3::Constant(0.5));
   EXPECT_EQ(data.active_voxels, 700);
+}
+
+/// Pages of this process that hold anything, in bytes.
+std::size_t resident() {
+  std::size_t all = 0, here = 0;
+  std::ifstream("/proc/self/statm") >> all >> here;
+  return here * static_cast<std::size_t>(::getpagesize());
+}
+
+// The box is what a file claims, the leaves and tiles what it holds.
+TEST(FlatVolume, FewLeavesInTheLargestBoxTakeLittleMemory) {
+  Example example;
+  for (int axis = 0; axis < 3; ++axis) example.header.hi[axis] = 4070;
+  example.leaves.push_back({{4064, 4064, 4064}, {}});
+  for (float& value : example.leaves.back().values) value = 3;
+  const std::size_t before = resident();
+  const VolumeData data = parsed(example.bytes());
+  EXPECT_LT(resident(), before + (std::size_t{64} << 20)) << "a table of 2^27 bricks has 512 MB";
+  EXPECT_EQ(data.values.value(8, 0, 1), 9);
+  EXPECT_EQ(data.values.value(4070, 4070, 4070), 3);
+  EXPECT_EQ(data.values.value(2000, 2000, 2000), 0);
+  EXPECT_EQ(data.values.summary(data.active).maximum, 519);
+}
+
+// What a fuzzer found: bricks whose values were written out one by one, and stored, a hundred million times.
+TEST(FlatVolume, OneTileInAFlatBoxIsStoredOnce) {
+  Example example;
+  example.leaves.clear();
+  example.tiles = {{{0, 0, 0}, 4096, 0.25f}};
+  example.header.hi[0] = example.header.hi[1] = 4090;
+  example.header.hi[2] = 12;
+  const VolumeData data = parsed(example.bytes());
+  constexpr std::size_t kTable = 513 * 513 * 3 * sizeof(std::uint32_t);
+  EXPECT_LT(data.values.bytes(), kTable + 100 * BrickGrid::kBrickValues * sizeof(float));
+  EXPECT_EQ(data.values.value(4090, 17, 12), 0.25f);
+  EXPECT_EQ(data.values.value(4090, 17, 13), 0.25f) << "the layer around the active voxels";
+  EXPECT_EQ(data.values.value(4090, 17, 14), 0);
 }
 
 TEST(FlatVolume, CutAnywhereIsRefused) {
