@@ -69,6 +69,8 @@ constexpr bool tells_events() {
 template <template <class> class E, class Value>
 void hold(const std::shared_ptr<const Medium>& medium) {
   constexpr int kDraws = 24;
+  // A telescoping march of the rarest level has 2^36 steps.
+  constexpr Real kMostLookups = 1e5;
   E<Value> tracker;
   if constexpr (requires { tracker.check(Extrema()); }) try {
       tracker.check(medium->extrema(medium->bounds()));
@@ -81,8 +83,9 @@ void hold(const std::shared_ptr<const Medium>& medium) {
       for (const Real forced : {Real{0}, kLargestUniform})
         for (std::uint64_t sample = 0; sample < 3; ++sample) {
           ForcedRng rng(sample, at, forced);
-          const auto outcome = walked.walk(rng);
+          const auto outcome = walked.walk(rng, kMostLookups);
           reached = reached || rng.reached();
+          if (outcome.lookups == kMostLookups) continue;
           const std::string where = fmt::format("{} channels, {}, u = {} at draw {} of sample {}", walked.ray.channels, with,
                                                 forced, at, sample);
           using Walked = HandWalked<E, Value>;

@@ -58,14 +58,17 @@ class HandWalked {
     if constexpr (requires { estimator.prepare(ray); }) estimator.prepare(ray);
   }
 
-  Outcome walk(auto& rng) const {
+  /// A walk that would take more lookups is given up, as the harness does: its lookups are `most`, and it has no result.
+  Outcome walk(auto& rng, Real most = kInfinity) const {
     typename E::Walk walk;
     Flight flight;
     flight.start(ray.majorant);
     estimator.init(walk, ray, flight, rng);
     Outcome outcome;
-    for (; estimator.propose(walk, ray, flight, rng); ++outcome.lookups)
+    for (; estimator.propose(walk, ray, flight, rng); ++outcome.lookups) {
+      if (outcome.lookups == most) return outcome;
       estimator.consume(walk, ray, flight, looked_up(walk, flight), rng);
+    }
     outcome.result = estimator.result(walk, ray);
     if constexpr (requires { estimator.event(walk, ray); }) outcome.event = estimator.event(walk, ray);
     return outcome;

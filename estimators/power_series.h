@@ -46,8 +46,10 @@ class SeriesSum {
     if (most > kBig || (scale_ > 0 && most < 1 / kBig)) rescale(most);
   }
 
-  /// Adds e^{-M} W / `chance`.
-  void add(Real chance = 1) { sum_ += weight_ * (factor_ / chance); }
+  /// Adds e^{-M} W / `chance`; one near the least number is that of a W as small.
+  void add(Real chance = 1) {
+    sum_ += chance < least_normal(chance) ? Value(weight_ / chance * factor_) : Value(weight_ * (factor_ / chance));
+  }
 
   void divide(Real by) { weight_ /= by; }
 

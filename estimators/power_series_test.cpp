@@ -53,8 +53,9 @@ TEST(PoissonTail, IsTheIncompleteGammaFunctionAndShort) {
         EXPECT_LT(exact, 0x1p-99) << mean << " " << i;
       else
         EXPECT_NEAR(stated, exact, 1e-11 * exact) << mean << " " << i;
-      if (exact > 1e-290 && mean > 1e-290)
+      if (exact > 1e-290 && mean > 1e-290) {
         EXPECT_NEAR(tail.log_at_least(i), std::log(exact), 1e-9 * (1 + std::abs(std::log(exact))));
+      }
       told += stated > 0 && stated < 1;
     }
     EXPECT_EQ(tail.at_least(0), 1);
