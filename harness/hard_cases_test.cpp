@@ -108,6 +108,15 @@ TEST(HardCases, WalksThatDoNotEndAreCounted) {
   }
 }
 
+/// Samples so small that their fourth moments are no numbers show no variance that a verdict could rest on.
+TEST(HardCases, PilotsWhoseMomentsUnderflowAreNotTrusted) {
+  const CellRecord record = record_of(
+      R"("samples_per_ray":64,"gate":{"max_samples_per_ray":100000,"laws":"never"},"matrix":{"estimator":"p_series_cumulative",
+         "medium":{"type":"layers","values":[1,0,3,0.5],"optical_depth":100}})");
+  ASSERT_TRUE(record.verdict);
+  EXPECT_EQ(record.verdict->unbiased, Outcome::inconclusive) << record.verdict->reason;
+}
+
 /// Lookups whose spread no theory states are judged by a pilot's, which says nothing where it has hardly seen one.
 TEST(HardCases, PilotsThatSawNoLookupProveNothingOfTheirNumber) {
   const CellRecord record = record_of(

@@ -306,11 +306,11 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function
   }
   pilot.samples = sampled->counters.samples;
   pilot.lookups = sampled->counters.lookups;
-  // Below this share of the raw moment a central one is rounding.
+  // Below this share of the raw moment a central one is rounding; one that has underflowed tells nothing.
   constexpr Real kCancelled = 1e-6;
   const auto count = n * static_cast<Real>(sampled->lookups.size());
   for (std::size_t o = 0; o < outputs; ++o) {
-    const bool seen = second[o] > kCancelled * raw[o];
+    const bool seen = second[o] > kCancelled * raw[o] && fourth[o] >= std::numeric_limits<Real>::min();
     pilot.variance_of_variance = std::max(pilot.variance_of_variance, seen ? fourth[o] / (second[o] * second[o]) - 1 / count : 1);
   }
   return pilot;
