@@ -25,7 +25,8 @@ struct Telescoping {
   Real r = 0.65;
 
   void parameters(ParameterVisitor& visit) {
-    visit.number("r", r, {0.5, 0.99, true}, "", "p(n) = r (1 - r)^n; mean lookups are finite above 1/2");
+    visit.number("r", r, {0.5, 0.93, true}, "",
+                 "p(n) = r (1 - r)^n; mean lookups are finite above 1/2, variances of smooth media below 15/16");
   }
 
   Claim claim(Quantity) const { return Claim::unbiased; }

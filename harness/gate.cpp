@@ -233,7 +233,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
   gate.errors_per_sum = gate.lookups_per_sum =
       static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
   const bool bounded = std::isfinite(gate.low) && std::isfinite(gate.high);
-  const bool distrusted = !analytic && !bounded && pilot->variance_of_variance >= kTrustedVariance;
+  const bool distrusted = !analytic && !bounded && (theory.infinite_variance || pilot->variance_of_variance >= kTrustedVariance);
   std::vector<Pool> pools;
   const Real ulp = epsilon_of(cell.precision);
   const Real mean_lookups = theory.lookups.value_or(
@@ -312,8 +312,10 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
           test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean), kPatience, gate.affordable);
   }
   if (distrusted)
-    gate.undecidable = fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
-                                   pilot->variance_of_variance);
+    gate.undecidable = theory.infinite_variance
+                           ? "the variance is infinite: no number of samples decides the mean"
+                           : fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
+                                         pilot->variance_of_variance);
 
   // The same machinery for what a sample costs.
   const bool known_cost = !theory.ray_lookups.empty();

@@ -489,6 +489,7 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<The
         cell.ray_shift[ray * outputs + o] = gap;
         cell.ray_variance[ray * outputs + o] = theory.variance.value_or(0);
         known = known && finite(theory.variance);
+        cell.infinite_variance = cell.infinite_variance || (theory.variance && *theory.variance == kInfinity);
         variance += theory.variance.value_or(0);
         bias += gap;
         squared += gap * gap;
@@ -504,7 +505,7 @@ std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<The
     for (std::size_t ray = 0; ray < rays; ++ray) {
       const Theory& theory = all[(ray * count + k) * channels];
       all_lookups = all_lookups && finite(theory.lookups);
-      heavy = heavy || (theory.lookups_variance && std::isinf(*theory.lookups_variance));
+      heavy = heavy || (theory.lookups_variance && *theory.lookups_variance == kInfinity);
       all_spreads = all_spreads && finite(theory.lookups_variance);
       lookups += cell.ray_lookups[ray] = theory.lookups.value_or(0);
       cell.ray_lookups_variance[ray] = theory.lookups_variance.value_or(0);

@@ -53,6 +53,7 @@ struct CellTheory {
   bool unit_weights = false;    ///< of a free path: its weight is always 1
   /// Per ray and output; empty where not known for all.  Variance of a sample; the estimator's own mean minus the target.
   std::vector<Real> ray_variance, ray_shift;
+  bool infinite_variance = false;  ///< stated of some ray: no sample variance is to be trusted
   std::vector<Real> ray_lookups, ray_lookups_variance;  ///< per ray; empty where not known for all
 };
 

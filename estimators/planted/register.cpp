@@ -3,6 +3,7 @@
 #include "estimators/planted/clamped.h"
 #include "estimators/planted/constants.h"
 #include "estimators/planted/control_twice.h"
+#include "estimators/planted/debiased.h"
 #include "estimators/planted/decomposition.h"
 #include "estimators/planted/decomposition_reset.h"
 #include "estimators/planted/flight_rate.h"
@@ -38,6 +39,7 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedDecompositionStart);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedEarlySurface);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedFirstSegment);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedFlightRate);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedGuidedEscape);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedHeroHistory);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedLastSegment);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedLostEscape);
@@ -52,11 +54,13 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedRayStreams, WrappedSource<PlantedRayStreams
 NULLMARK_REGISTER_PLANTED_BUG(PlantedReference);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedRoulette);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedSecondLookup);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedSharedOffset);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedSpectralSum);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedStaleResidual);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedStepParenthesis);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedStrictTail);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedTerminalTerm);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedUnweightedLevel);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedWeightSign);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedWholeDepth);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedZero);

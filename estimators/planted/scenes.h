@@ -72,6 +72,14 @@ inline constexpr PlantedScene kPlantedScenes[] = {
     {"planted_decomposition_marginal", R"("planted_decomposition_marginal")", kRising, kBound, kThroughTheBox, -0.153518},
     // e^{-3/2} - 1: every other collision kills all channels
     {"planted_spectral_sum", R"("planted_spectral_sum")", kThreeChannels, kTwice, kThroughTheBox, -0.776870},
+    // sinh(1/2)/(1/2) - 1: two steps, whose common offset shifts the depth by up to 1/2
+    {"planted_shared_offset", R"("planted_shared_offset")", R"({"type":"linear","begin":0.5,"end":2.5})",
+     R"({"type":"global","looseness":0.05})", kThroughTheBox, 0.042191},
+    // .35 (E e^{-mu}/T - 1): .65 of each difference is told
+    {"planted_unweighted_level", R"("planted_unweighted_level")", R"({"type":"linear","begin":0.5,"end":2.5})", kBound,
+     kThroughTheBox, 0.0613204},
+    // e^{-1}: W(r) = e^{-r/2} (1 + r/2) from a collision on, r the depth left
+    {"planted_guided_escape", R"("planted_guided_escape")", kConstant, kTwice, kThroughTheBox, 0.367879},
     // avg_h e^{4 (a_h a_0/avg a - 1)} e^{1/2} - 1, a = (7/8, 3/4, 1/2)
     {"planted_hero_history", R"("planted_hero_history")", kThreeChannels, kTwice, kThroughTheBox, 0.288118},
     // e^{1/5} - 1

@@ -1,0 +1,69 @@
+#pragma once
+
+#include "estimators/estimator.h"
+#include "estimators/guided_theory.h"
+
+namespace nullmark {
+
+/// Majorant-guided ratio tracking [Misso, Li, Burley, Teece, Jarosz 2023]: the next flight has the rate of null collisions at the
+/// last lookup, m = max(mub - mu, .1 mub), and the weight makes up for it.  In majorant depth s, where local bounds are 1 and q =
+/// m/mub, with T(s) = e^{-(M - s)} + int_s^M e^{-(z - s)} (1 - mu/mub)(z) T(z) dz sampled by q e^{-q (z - s)}:
+///
+///   W *= (1 - mu/mub)/q e^{(q - 1) ds} at a collision, e^{(q - 1)(M - s)} at the end, q = max(1 - mu/mub, .1) from there on.
+///
+/// The first q is 1 or, with `start` = lookup, that of the ray's begin at one more lookup; it then has no variance on constant
+/// extinction with mub - mu >= .1 mub.  Unbiased for any rate.  Where mub bounds mu every (1 - mu/mub)/q of a collision and the q
+/// chosen there is at most 1: samples are in [0, 1], or in [0, 10] when the start is looked up.  Several channels fly at the q of
+/// the thinnest, so that this holds for each.  Variance and lookups solve Volterra equations in s (see guided_moments).
+template <class Value>
+struct MajorantGuidedRatio {
+  static constexpr const char* kName = "majorant_guided_ratio";
+  static constexpr const char* kSummary = "majorant-guided ratio tracking: flights at the rate of null collisions last seen";
+  static constexpr const char* kSource = "Misso, Li, Burley, Teece, Jarosz 2023, Sec. 5";
+  static constexpr SampleRange kRange = SampleRange::unit;
+  static constexpr bool kNeedsBound = false;
+  static constexpr bool kOwnFlights = true;
+
+  std::string start = "majorant";
+
+  void parameters(ParameterVisitor& visit) {
+    visit.choice("start", start, {"majorant", "lookup"},
+                 "rate of the first flight: the majorant, or as looked up where the ray begins");
+  }
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  SampleRange range() const { return start == "lookup" ? SampleRange::non_negative : kRange; }
+
+  struct Walk {
+    Value weight;
+    Real rate = 1;  ///< q
+    bool started = false;
+  };
+
+  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), 1, start == "majorant"}; }
+
+  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+    if (!walk.started) return flight.advance_to(0);
+    const Real before = flight.depth(), total = ray.majorant.total_depth();
+    const bool inside = flight.advance_to(before + rng.exponential() / walk.rate);
+    walk.weight *= exponential((walk.rate - 1) * (std::min(flight.depth(), total) - before));
+    return inside;
+  }
+
+  void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto&) const {
+    if (walk.started) walk.weight *= (at.rate() - extinction) / (at.rate() * walk.rate);
+    walk.rate = std::max(kLeastRate, (at.rate() - smallest(extinction)) / at.rate());
+    walk.started = true;
+  }
+
+  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+
+  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+    return guided_moments(ray.majorant, profile, c, kLeastRate, start == "lookup");
+  }
+
+  static constexpr Real kLeastRate = 0.1;
+};
+
+}  // namespace nullmark
