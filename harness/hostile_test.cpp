@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "harness/config.h"
+#include "harness/exit_code.h"
 #include "harness/json_input.h"
 #include "harness/program_test.h"
+#include "harness/ray_memory.h"
 
 namespace nullmark {
 namespace {
@@ -65,7 +67,48 @@ TEST(Hostile, ManyCellsAreExpandedInLinearTime) {
   EXPECT_EQ(read_config(text, "c.json").cells.size(), 20000u);
 }
 
+/// A thousand cells on the same rays.
+std::string many_rays(const std::string& rays) {
+  return R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","samples_per_ray":1,"matrix":{"estimator":"ratio","rays":)" +
+         rays + R"(,"medium":{"type":"linear","end":)" + sweep(1000) + "}}}]}";
+}
+
+TEST(Hostile, RaysThatNoMachineHoldsAreRefused) {
+  for (const char* rays :
+       {R"({"type":"orthographic","width":16384,"height":16384})", R"({"type":"perspective","width":16384,"height":16384})",
+        R"({"type":"chords","count":100000000})", R"({"type":"inside","count":100000000})"})
+    try {
+      const Plan plan = read_config(many_rays(rays), "c.json");
+      expect_rays_fit(plan, [](std::size_t) { return true; });
+      ADD_FAILURE() << rays;
+    } catch (const ParameterError& error) {
+      EXPECT_EQ(error.parameter, "/experiments/0/matrix/rays");
+      const std::string message = error.what();
+      EXPECT_NE(message.find(" rays, with those of the cells before them, take at least "), std::string::npos) << message;
+      EXPECT_NE(message.find("make fewer rays"), std::string::npos) << message;
+      EXPECT_EQ(message.find('\n'), std::string::npos);
+    }
+  const Plan plan = read_config(many_rays(R"({"type":"orthographic","width":16384,"height":16384})"), "c.json");
+  EXPECT_NO_THROW(expect_rays_fit(plan, [](std::size_t) { return false; })) << "only what is to run counts";
+}
+
 class HostileFiles : public ProgramTest {};
+
+/// Within a limit of addresses, so that a program that did ask for the memory would not get it.
+TEST_F(HostileFiles, RaysAreCountedBeforeTheyAreMade) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers take all addresses";
+#endif
+  write("c.json", many_rays(R"({"type":"perspective","width":16384,"height":16384})"));
+  for (const char* command : {"run c.json", "run c.json --dry-run"}) {
+    const std::string limited =
+        fmt::format("ulimit -v 4000000; cd '{}' && '{}' {} >out 2>err", folder_.string(), NULLMARK_PROGRAM, command);
+    EXPECT_EQ(WEXITSTATUS(std::system(limited.c_str())), static_cast<int>(ExitCode::input_error));
+    const std::string error = read("err");
+    EXPECT_EQ(error.rfind("nullmark: /experiments/0/matrix/rays: 268435456 rays", 0), 0u) << error;
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << error;
+  }
+}
 
 TEST_F(HostileFiles, LinksToResultsStayLinks) {
   std::filesystem::create_directories(folder_ / "elsewhere");

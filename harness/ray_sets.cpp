@@ -22,6 +22,8 @@ Vec3 random_direction(Rng& rng) {
   return {r * std::cos(phi), r * std::sin(phi), z};
 }
 
+std::size_t pixels(int width, int height) { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+
 struct SingleRay final : RaySetSource {
   static constexpr const char* kName = "single";
   static constexpr const char* kSummary = "one ray, between two points";
@@ -33,6 +35,7 @@ struct SingleRay final : RaySetSource {
     visit.point("from", from, "length", "start of the ray");
     visit.point("to", to, "length", "end of the ray");
   }
+  std::size_t count() const override { return 1; }
   RaySet rays(const Box&) const override { return {{Ray{from, normalised(to - from, "to"), 0, (to - from).norm()}}, 0, 0}; }
 };
 
@@ -49,9 +52,11 @@ struct Orthographic final : RaySetSource {
     visit.integer("height", height, 1, 16384, "pixels up");
     visit.choice("axis", axis, {"x", "y", "z"}, "direction of the rays; x looks over (y, z), y over (x, z), z over (x, y)");
   }
+  std::size_t count() const override { return pixels(width, height); }
   RaySet rays(const Box& bounds) const override {
     const int along = axis[0] - 'x', across = along == 0 ? 1 : 0, up = along == 2 ? 1 : 2;
     RaySet set{{}, width, height};
+    set.rays.reserve(count());
     for (int j = 0; j < height; ++j)
       for (int i = 0; i < width; ++i) {
         Vec3 origin = bounds.lo;
@@ -80,12 +85,14 @@ struct Perspective final : RaySetSource {
     visit.point("view", view, "", "direction from the middle of the bounds to the eye");
     visit.point("up", up, "", "upward direction");
   }
+  std::size_t count() const override { return pixels(width, height); }
   RaySet rays(const Box& bounds) const override {
     const Vec3 back = normalised(view, "view");
     const Vec3 eye = (bounds.lo + bounds.hi) / 2 + distance * bounds.extent().norm() * back;
     const Vec3 right = normalised(up.cross(back), "up"), above = back.cross(right);
     const Real scale = std::tan(field_of_view / 360 * std::numbers::pi);
     RaySet set{{}, width, height};
+    set.rays.reserve(count());
     for (int j = 0; j < height; ++j)
       for (int i = 0; i < width; ++i) {
         const Real a = (2 * (i + 0.5) / width - 1) * scale * width / height, b = (2 * (j + 0.5) / height - 1) * scale;
@@ -102,17 +109,18 @@ struct Chords final : RaySetSource {
   static constexpr const char* kSummary = "isotropic random lines that hit the bounds";
   static constexpr const char* kSource = "Santalo, Integral geometry";
 
-  int count = 1024, seed = 1;
+  int number = 1024, seed = 1;
 
   void parameters(ParameterVisitor& visit) override {
-    visit.integer("count", count, 1, 100'000'000, "rays");
+    visit.integer("count", number, 1, 100'000'000, "rays");
     visit.integer("seed", seed, 0, 2'147'483'647, "of the lines");
   }
+  std::size_t count() const override { return static_cast<std::size_t>(number); }
   RaySet rays(const Box& bounds) const override {
     RaySet set;
     const Vec3 centre = (bounds.lo + bounds.hi) / 2;
     const Real radius = bounds.extent().norm() / 2;
-    for (std::uint64_t line = 0; set.rays.size() < static_cast<std::size_t>(count); ++line) {
+    for (std::uint64_t line = 0; set.rays.size() < count(); ++line) {
       Rng rng(SampleAddress{static_cast<std::uint64_t>(seed), 0, line});
       const Vec3 direction = random_direction(rng);
       const Vec3 side = direction.unitOrthogonal(), other = direction.cross(side);
@@ -129,15 +137,16 @@ struct Inside final : RaySetSource {
   static constexpr const char* kSummary = "rays that start at uniform points inside the bounds, in isotropic directions";
   static constexpr const char* kSource = "";
 
-  int count = 1024, seed = 1;
+  int number = 1024, seed = 1;
 
   void parameters(ParameterVisitor& visit) override {
-    visit.integer("count", count, 1, 100'000'000, "rays");
+    visit.integer("count", number, 1, 100'000'000, "rays");
     visit.integer("seed", seed, 0, 2'147'483'647, "of the starts and directions");
   }
+  std::size_t count() const override { return static_cast<std::size_t>(number); }
   RaySet rays(const Box& bounds) const override {
     RaySet set;
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < number; ++i) {
       Rng rng(SampleAddress{static_cast<std::uint64_t>(seed), 1, static_cast<std::uint64_t>(i)});
       const Vec3 at = bounds.lo + Vec3(rng.uniform(), rng.uniform(), rng.uniform()).cwiseProduct(bounds.extent());
       set.rays.push_back({at, random_direction(rng), 0, kInfinity});

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,6 +23,8 @@ class RaySetSource {
  public:
   virtual ~RaySetSource() = default;
   virtual void parameters(ParameterVisitor& visit) = 0;
+  /// How many `rays` makes.
+  virtual std::size_t count() const = 0;
   virtual RaySet rays(const Box& world_bounds) const = 0;
 };
 

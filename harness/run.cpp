@@ -22,6 +22,7 @@
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 #include "harness/path_kernel.h"
+#include "harness/ray_memory.h"
 #include "harness/sampling.h"
 #include "harness/timing.h"
 #include "harness/verdict.h"
@@ -613,6 +614,7 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
 
 /// Prepares the cells that `wanted` picks, by their place in the plan.
 std::vector<PreparedCell> prepare_all(Workshop& workshop, const Plan& plan, const std::function<bool(std::size_t)>& wanted) {
+  expect_rays_fit(plan, wanted);
   std::vector<PreparedCell> cells;
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
     if (wanted(i)) cells.push_back(workshop.prepare(plan.cells[i], i));

@@ -34,7 +34,7 @@ BrickGrid::BrickGrid(const IndexBox& box, float background) : background_(backgr
                             text(std::int64_t{box.hi[1]} - box.lo[1] + 1) + " x " +
                             text(std::int64_t{box.hi[2]} - box.lo[2] + 1) + " voxels exceeds the limit of " + text(kMaxBricks) +
                             " bricks of 8^3");
-  table_.resize(static_cast<std::size_t>(bricks));
+  table_ = SparseTable(static_cast<std::size_t>(bricks));
 }
 
 Index3 BrickGrid::origin(std::size_t table_index) const {
@@ -114,7 +114,7 @@ void BrickGrid::store(std::size_t brick, const Pattern& pattern) {
 }
 
 std::size_t BrickGrid::bytes() const {
-  return sizeof *this + table_.size() * sizeof table_[0] + values_.size() * sizeof values_[0] +
+  return sizeof *this + table_.size() * sizeof(std::uint32_t) + values_.size() * sizeof values_[0] +
          summaries_.size() * sizeof summaries_[0];
 }
 
@@ -128,7 +128,12 @@ std::uint64_t BrickGrid::content_hash() const {
     hash = hash_mixed(hash, static_cast<std::uint32_t>(box_.lo[axis]));
     hash = hash_mixed(hash, static_cast<std::uint32_t>(box_.hi[axis]));
   }
-  for (const std::uint32_t b : table_) hash = hash_mixed(hash, bricks[b]);
+  for (std::size_t b = 0; b < table_.size(); ++b) {
+    hash = hash_mixed(hash, bricks[table_[b]]);
+    if (table_[b] != 0) continue;
+    // A chain has to be gone through, but without a look at every place.
+    for (const std::size_t end = table_.unset_until(b + 1, table_.size()); b + 1 < end; ++b) hash = hash_mixed(hash, bricks[0]);
+  }
   return hash;
 }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "media/lanes.h"
-#include "media/zeroed_pages.h"
+#include "media/sparse_table.h"
 
 namespace nullmark {
 
@@ -172,7 +172,7 @@ class BrickGrid {
   // Whole bricks around the box, one voxel wider below, where the lowest voxels are upper taps; half open.
   std::array<int, 3> table_lo_{}, table_hi_{};
   std::array<std::size_t, 3> shape_{};
-  std::vector<std::uint32_t, ZeroedPages<std::uint32_t>> table_;  ///< 0: background
+  SparseTable table_;  ///< 0: background
   std::vector<float> values_;
   std::vector<BrickSummary> summaries_;
 };
@@ -237,13 +237,14 @@ BrickGrid BrickGrid::build(const IndexBox& box, float background, const Bricks& 
     corners.fill(value);
     return uncut(corners);
   };
-  std::map<Pattern, std::uint32_t> shared{{uniform(background), 0}};
-  std::uint32_t count = 1;
+  std::map<Pattern, std::uint32_t> shared;
+  std::vector<const Pattern*> patterns;
   const auto share = [&](const Pattern& pattern) {
-    const auto [found, added] = shared.try_emplace(pattern, count);
-    count += added;
+    const auto [found, added] = shared.try_emplace(pattern, static_cast<std::uint32_t>(patterns.size()));
+    if (added) patterns.push_back(&found->first);
     return found->second;
   };
+  share(uniform(background));
 
   std::vector<std::size_t> filled;
   bricks(grid.first(), grid.shape_, [&](std::size_t begin, std::size_t end, const Corners* corners) {
@@ -251,11 +252,16 @@ BrickGrid BrickGrid::build(const IndexBox& box, float background, const Bricks& 
       for (std::size_t b = begin; b < end; ++b) filled.push_back(b);
       return;
     }
-    // Only the ends of a row are cut by the box in ways of their own.
-    Index3 at = grid.origin(begin);
-    for (std::size_t b = begin; b < end; ++b, at[2] += kSide) {
-      const bool as_before = b > begin && at[2] - kSide >= box.lo[2] && at[2] + kSide <= box.hi[2];
-      grid.table_[b] = as_before ? grid.table_[b - 1] : share(grid.cut(*corners, at));
+    // Only the ends of a row are cut by the box in ways of their own, and most rows are like the one before.
+    const Index3 at = grid.origin(begin);
+    const std::size_t row = grid.shape_[2];
+    for (std::size_t b = begin, next; b < end; b = next) {
+      const Index3 here = at + Index3(0, 0, kSide * static_cast<int>(b - begin));
+      const Pattern pattern = grid.cut(*corners, here);
+      const bool whole = here[2] >= box.lo[2] && here[2] + kSide <= box.hi[2];
+      next = whole ? std::min(end, b + static_cast<std::size_t>((box.hi[2] - here[2]) / kSide)) : b + 1;
+      const bool as_before = b >= row && grid.table_[b - row] < patterns.size() && *patterns[grid.table_[b - row]] == pattern;
+      grid.table_.set(b, next, as_before ? grid.table_[b - row] : share(pattern));
     }
   });
 
@@ -275,7 +281,10 @@ BrickGrid BrickGrid::build(const IndexBox& box, float background, const Bricks& 
     only[n] = same ? values[0] : std::numeric_limits<float>::quiet_NaN();
   });
   for (std::size_t n = 0; n < filled.size(); ++n)
-    grid.table_[filled[n]] = std::isnan(only[n]) ? count++ : share(uniform(only[n]));
+    if (!std::isnan(only[n])) grid.table_.set(filled[n], filled[n] + 1, share(uniform(only[n])));
+  auto count = static_cast<std::uint32_t>(patterns.size());
+  for (std::size_t n = 0; n < filled.size(); ++n)
+    if (std::isnan(only[n])) grid.table_.set(filled[n], filled[n] + 1, count++);
 
   grid.allocate(count);
   for (const auto& [pattern, brick] : shared) grid.store(brick, pattern);
@@ -357,15 +366,23 @@ RangeSummary BrickGrid::summary(const IndexBox& range, const Weights& weights, R
         }
       }
   };
-  for (std::size_t i = 0; i < stretches[0].size(); ++i)
+  const std::size_t high = stretches[2].size();
+  for (std::size_t i = 0; i < stretches[0].size(); ++i) {
+    const std::size_t slice = ((first[0] + i) * shape_[1] + first[1]) * shape_[2] + first[2];
+    const std::size_t slice_end = std::min(slice + stretches[1].size() * shape_[2], table_.size());
+    if (table_.unset_until(slice, slice_end) == slice_end) {
+      outside = true;
+      continue;
+    }
     for (std::size_t j = 0; j < stretches[1].size(); ++j)
-      for (std::size_t k = 0; k < stretches[2].size(); ++k) {
-        const Stretch &x = stretches[0][i], &y = stretches[1][j], &z = stretches[2][k];
-        const std::size_t brick = table_[((first[0] + i) * shape_[1] + first[1] + j) * shape_[2] + first[2] + k];
+      for (std::size_t row = slice + j * shape_[2], end = row + high, b = row; b < end; ++b) {
+        const std::uint32_t brick = table_[b];
         if (brick == 0) {
           outside = true;
+          b = std::max(b + 1, table_.unset_until(b + 1, end)) - 1;
           continue;
         }
+        const Stretch &x = stretches[0][i], &y = stretches[1][j], &z = stretches[2][b - row];
         const BrickSummary& all = summaries_[brick];
         const Real w = x.total * y.total * z.total;
         covered += w;
@@ -378,6 +395,7 @@ RangeSummary BrickGrid::summary(const IndexBox& range, const Weights& weights, R
         result.maximum = std::max<Real>(result.maximum, all.maximum);
         sum += whole ? all.sum : w * all.minimum;
       }
+  }
   if (outside) {
     result.minimum = std::min<Real>(result.minimum, background_);
     result.maximum = std::max<Real>(result.maximum, background_);

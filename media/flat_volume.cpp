@@ -60,23 +60,27 @@ class FlatVoxels {
   template <class Visit>
   void bricks(const Index3& first, const std::array<std::size_t, 3>& shape, const Visit& visit) {
     index(first, shape);
-    for (std::size_t i = 0; i < shape[0]; ++i)
+    for (std::size_t i = 0; i < shape[0]; ++i) {
+      if (owner_.unset_until(place(i, 0, 0), place(i + 2, 0, 0)) == place(i + 2, 0, 0)) continue;
       for (std::size_t j = 0; j < shape[1]; ++j) {
         const std::size_t row = (i * shape[1] + j) * shape[2];
-        const std::array<const std::uint32_t*, 4> rows{&owner_at(i, j, 0), &owner_at(i, j + 1, 0), &owner_at(i + 1, j, 0),
-                                                       &owner_at(i + 1, j + 1, 0)};
+        const std::array<std::size_t, 4> rows{place(i, j, 0), place(i, j + 1, 0), place(i + 1, j, 0), place(i + 1, j + 1, 0)};
         Owners owners{};
         std::size_t begin = 0;
         for (std::size_t k = 0; k < shape[2]; ++k) {
-          const Owners here{rows[0][k], rows[0][k + 1], rows[1][k], rows[1][k + 1],
-                            rows[2][k], rows[2][k + 1], rows[3][k], rows[3][k + 1]};
-          if (here == owners) continue;
-          visit_stretch(row + begin, row + k, owners, visit);
-          owners = here;
-          begin = k;
+          Owners here;
+          for (std::size_t r = 0; r < rows.size(); ++r)
+            here[2 * r] = owner_[rows[r] + k], here[2 * r + 1] = owner_[rows[r] + k + 1];
+          if (here != owners) {
+            visit_stretch(row + begin, row + k, owners, visit);
+            owners = here;
+            begin = k;
+          }
+          k = same_until(rows, owners, k, shape[2]);
         }
         visit_stretch(row + begin, row + shape[2], owners, visit);
       }
+    }
   }
 
   /// As BrickGrid::build asks for it.
@@ -85,8 +89,9 @@ class FlatVoxels {
     const Index3 at = origin / n - first_;
     for (int corner = 0; corner < 8; ++corner) {
       const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
-      const std::uint32_t owner =
-          owner_at(static_cast<std::size_t>(at[0] + x), static_cast<std::size_t>(at[1] + y), static_cast<std::size_t>(at[2] + z));
+      const Index3 brick = at + Index3(x, y, z);
+      const std::uint32_t owner = owner_[place(static_cast<std::size_t>(brick[0]), static_cast<std::size_t>(brick[1]),
+                                               static_cast<std::size_t>(brick[2]))];
       const std::byte* const voxels =
           is_leaf(owner) ? leaves_ + (owner - 1) * sizeof(FlatLeaf) + offsetof(FlatLeaf, values) : nullptr;
       // The brick itself, or the one layer of its neighbours that is the apron.
@@ -111,7 +116,7 @@ class FlatVoxels {
     first_ = first;
     shape_ = shape;
     // One more on every axis, for the upper neighbours of the last.
-    owner_.resize((shape[0] + 1) * (shape[1] + 1) * (shape[2] + 1));
+    owner_ = SparseTable((shape[0] + 1) * (shape[1] + 1) * (shape[2] + 1));
     for (std::size_t n = 0; n < leaf_count_; ++n) {
       std::int32_t origin[3];
       std::memcpy(origin, leaves_ + n * sizeof(FlatLeaf), sizeof origin);
@@ -126,6 +131,23 @@ class FlatVoxels {
       if (unusable(tile.value))
         refuse_voxel(Index3(tile.origin[0], tile.origin[1], tile.origin[2]).cwiseMax(box_.lo), tile.value, header_);
     }
+  }
+
+  /// The last brick of a row up to which, from brick k on, all have the owners that it has, as far as each row of them has but
+  /// one.
+  std::size_t same_until(const std::array<std::size_t, 4>& rows, const Owners& owners, std::size_t k, std::size_t end) const {
+    for (std::size_t r = 0; r < rows.size(); ++r)
+      if (owners[2 * r] != owners[2 * r + 1]) return k;
+    const std::uint32_t* const table = owner_.data();
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      std::size_t at = rows[r] + k + 2;
+      const std::size_t last = rows[r] + end + 1;
+      if (owners[2 * r] == 0) at = owner_.unset_until(at, last);
+      const auto* const changed =
+          std::find_if(table + std::min(at, last), table + last, [&](auto o) { return o != owners[2 * r]; });
+      end = static_cast<std::size_t>(changed - table) - rows[r] - 1;
+    }
+    return end - 1;
   }
 
   template <class Visit>
@@ -150,9 +172,7 @@ class FlatVoxels {
                       : taken<float>(tiles_ + (owner - leaf_count_ - 1) * sizeof(FlatTile) + offsetof(FlatTile, value));
   }
 
-  const std::uint32_t& owner_at(std::size_t i, std::size_t j, std::size_t k) const {
-    return owner_[(i * (shape_[1] + 1) + j) * (shape_[2] + 1) + k];
-  }
+  std::size_t place(std::size_t i, std::size_t j, std::size_t k) const { return (i * (shape_[1] + 1) + j) * (shape_[2] + 1) + k; }
 
   void claim(const std::int32_t (&origin)[3], int side, std::size_t owner) {
     if (!meets(box_, origin, side)) throw Inconsistent("a leaf or tile lies outside the box of its grid");
@@ -165,10 +185,10 @@ class FlatVoxels {
     }
     for (std::size_t i = begin[0]; i < end[0]; ++i)
       for (std::size_t j = begin[1]; j < end[1]; ++j) {
-        std::uint32_t* const row = owner_.data() + (i * (shape_[1] + 1) + j) * (shape_[2] + 1);
-        if (std::any_of(row + begin[2], row + end[2], [](std::uint32_t place) { return place != 0; }))
+        const std::size_t row = place(i, j, 0);
+        if (std::any_of(owner_.data() + row + begin[2], owner_.data() + row + end[2], [](auto other) { return other != 0; }))
           throw Inconsistent("leaves or tiles overlap");
-        std::fill(row + begin[2], row + end[2], static_cast<std::uint32_t>(owner));
+        owner_.set(row + begin[2], row + end[2], static_cast<std::uint32_t>(owner));
       }
   }
 
@@ -178,7 +198,7 @@ class FlatVoxels {
   IndexBox box_;
   Index3 first_ = Index3::Zero();  ///< brick of the table, which is BrickGrid's but for one more on every axis
   std::array<std::size_t, 3> shape_{};
-  std::vector<std::uint32_t, ZeroedPages<std::uint32_t>> owner_;  ///< 0: background; then leaves, then tiles, counted from 1
+  SparseTable owner_;  ///< 0: background; then leaves, then tiles, counted from 1
 };
 
 std::uint64_t content_hash(const BrickGrid& values, const Affine& map) {
