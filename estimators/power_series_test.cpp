@@ -237,7 +237,7 @@ TEST(Cumulative, SaysNothingWhereItsChancesDependOnThePoints) {
 TEST(Cumulative, ChannelsShareTheRoulette) {
   const auto expect = [](const std::shared_ptr<const Medium>& medium, Real looseness, int pieces) {
     const HandWalked<PowerSeriesCumulative, Spectrum> hand({}, medium, 1, looseness, pieces);
-    constexpr std::uint64_t kSamples = 1 << 20;
+    constexpr std::uint64_t kSamples = 1 << 18;
     std::vector<Estimate> result(3), square(3);
     Estimate lookups;
     for (std::uint64_t sample = 0; sample < kSamples; ++sample) {
