@@ -49,12 +49,14 @@ TEST(PoissonTail, IsTheIncompleteGammaFunctionAndShort) {
     std::int64_t told = 0;
     for (std::int64_t i = std::max<std::int64_t>(1, middle - reach); i <= middle + reach; ++i) {
       const Real exact = boost::math::gamma_p(static_cast<Real>(i), mean), stated = tail.at_least(i);
-      if (stated == 0)
+      if (stated == 0) {
         EXPECT_LT(exact, 0x1p-99) << mean << " " << i;
-      else
+      } else {
         EXPECT_NEAR(stated, exact, 1e-11 * exact) << mean << " " << i;
-      if (exact > 1e-290 && mean > 1e-290)
+      }
+      if (exact > 1e-290 && mean > 1e-290) {
         EXPECT_NEAR(tail.log_at_least(i), std::log(exact), 1e-9 * (1 + std::abs(std::log(exact))));
+      }
       told += stated > 0 && stated < 1;
     }
     EXPECT_EQ(tail.at_least(0), 1);
