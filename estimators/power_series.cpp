@@ -8,7 +8,7 @@ namespace nullmark {
 
 void PoissonTail::set_up(Real mean) {
   // P(N <= M - 9 sqrt(M)) < e^{-81/2} = 2.6e-18, and a walk that long is an error before the table ends.
-  constexpr Real kDeviations = 9, kLongest = 0x1p31, kNothing = 0x1p-100;
+  constexpr Real kDeviations = 9, kLongest = 0x1p31, kNothing = 0x1p-115;
   const Real low = std::max<Real>(0, std::floor(mean - kDeviations * std::sqrt(mean) - 10));
   mean_ = mean;
   tail_.clear();

@@ -93,8 +93,8 @@ inline constexpr PlantedScene kPlantedScenes[] = {
     {"planted_terminal_term", R"("planted_terminal_term")", kConstant, kTwice, kThroughTheBox, -0.316060},
     // 1/(1 + e^{-1}) - 1: all weight is gone after the first collision
     {"planted_lost_escape", R"("planted_lost_escape")", kConstant, kBound, kThroughTheBox, -0.268941},
-    // e/(2 + e) - 1: only the pair of both ends is left
-    {"planted_lost_walks", R"("planted_lost_walks")", kConstant, kBound, kThroughTheBox, -0.423883},
+    // -2 E[2^{-N}/(2 + sum_gaps e^gap)] e, N uniform points in [0, 2], N of mean 2: a renewal equation for each s of e^{-s sum}
+    {"planted_lost_walks", R"("planted_lost_walks")", kConstant, kTwice, kThroughTheBox, -0.227225},
     // e^{-1} sum_i P(N >= i)/(i! P(N > i)) - 1, N of mean 2
     {"planted_strict_tail", R"("planted_strict_tail")", kConstant, kTwice, kThroughTheBox, 0.433624},
     // e^{-1/2} - 1
