@@ -259,29 +259,60 @@ struct MarchLaw {
   }
 
   /// log E e^{s (X - E X)}, in a form that does not cancel.
-  Complex log_characteristic(Complex s) const {
-    Complex sum = 0;
-    for (const Law& law : parts) {
-      Complex z = 0;
-      for (std::size_t i = 0; i < law.x.size(); ++i) {
-        const Real grow = s.real() * law.x[i], turn = s.imag() * law.x[i], half = std::sin(turn / 2);
-        z += law.w[i] * Complex(std::expm1(grow) * std::cos(turn) - 2 * half * half, std::exp(grow) * std::sin(turn));
-      }
-      sum += Complex(std::log1p(2 * z.real() + std::norm(z)) / 2, std::arg(Real{1} + z));
-    }
-    return sum;
-  }
+  Complex log_characteristic(Complex s) const;
 };
 
-/// e^s - 1, real part.
-Real real_expm1(Complex s) {
+/// e^s - 1 without cancellation.
+Complex complex_expm1(Complex s) {
   const Real half = std::sin(s.imag() / 2);
-  return std::expm1(s.real()) * std::cos(s.imag()) - 2 * half * half;
+  return {std::expm1(s.real()) * std::cos(s.imag()) - 2 * half * half, std::exp(s.real()) * std::sin(s.imag())};
 }
+
+Complex complex_log1p(Complex z) { return {std::log1p(2 * z.real() + std::norm(z)) / 2, std::arg(Real{1} + z)}; }
+
+Complex MarchLaw::log_characteristic(Complex s) const {
+  Complex sum = 0;
+  for (const Law& law : parts) {
+    Complex z = 0;
+    for (std::size_t i = 0; i < law.x.size(); ++i) z += law.w[i] * complex_expm1(s * law.x[i]);
+    sum += complex_log1p(z);
+  }
+  return sum;
+}
+
+/// phi(real + i u) - 1 of a march for |u| <= 1, by its Chebyshev interpolant: phi is entire, and the march is asked for it often.
+class Characteristic {
+ public:
+  Characteristic(const MarchLaw& march, Real real) {
+    for (std::size_t k = 0; k < kPoints; ++k) {
+      const Real angle = std::numbers::pi * (static_cast<Real>(k) + .5) / kPoints;
+      u_[k] = std::cos(angle);
+      weight_[k] = (k % 2 == 0 ? 1 : -1) * std::sin(angle);
+      value_[k] = k < kPoints / 2 ? complex_expm1(march.log_characteristic({real, u_[k]})) : std::conj(value_[kPoints - 1 - k]);
+    }
+  }
+
+  Complex operator()(Real u) const {
+    Complex above = 0;
+    Real below = 0;
+    for (std::size_t k = 0; k < kPoints; ++k) {
+      if (u == u_[k]) return value_[k];
+      const Real w = weight_[k] / (u - u_[k]);
+      above += w * value_[k];
+      below += w;
+    }
+    return above / below;
+  }
+
+ private:
+  static constexpr std::size_t kPoints = 48;
+  std::array<Real, kPoints> u_, weight_;
+  std::array<Complex, kPoints> value_;
+};
 
 /// Nodes on [0, 1] of a Gauss-Legendre rule.
 Law legendre() {
-  using Rule = boost::math::quadrature::gauss<Real, 20>;
+  using Rule = boost::math::quadrature::gauss<Real, 12>;
   Law rule;
   for (std::size_t i = 0; i < Rule::abscissa().size(); ++i)
     for (const int side : {-1, 1}) {
@@ -365,17 +396,18 @@ Theory jackknife_march(const RayProfile& profile, int c, int m, int steps, bool 
     const Real width = std::sqrt(march.variance);
     if (!(width < kWidest)) return {};
     const int points = 4 + static_cast<int>(std::ceil(8 * width));
-    const auto moment = [&](Real real, Real length) {
+    const auto moment = [&](const Characteristic& phi, Real length) {
       return over_directions(m, points, [&](const std::array<Real, 4>& w) {
         Complex sum = 0;
         for (int j = 0; j < m; ++j)
-          sum += march.log_characteristic({real / m, length * w[static_cast<std::size_t>(j)] / std::sqrt(static_cast<Real>(m))});
-        return real_expm1(sum);
+          sum += complex_log1p(phi(length * w[static_cast<std::size_t>(j)] / std::sqrt(static_cast<Real>(m))));
+        return complex_expm1(sum).real();
       });
     };
-    first = moment(-1, 1);
+    const Characteristic once(march, -Real{1} / m), twice(march, -Real{2} / m);
+    first = moment(once, 1);
     const Law lengths = sum_lengths(m, points);
-    for (std::size_t i = 0; i < lengths.x.size(); ++i) second += lengths.w[i] * moment(-2, lengths.x[i]);
+    for (std::size_t i = 0; i < lengths.x.size(); ++i) second += lengths.w[i] * moment(twice, lengths.x[i]);
   }
   const Real mean = transmittance * (1 + first);
   const Real variance = transmittance * transmittance * std::max<Real>(0, second - 2 * first - first * first);
