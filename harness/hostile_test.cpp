@@ -82,7 +82,7 @@ TEST(Hostile, RaysThatNoMachineHoldsAreRefused) {
       expect_rays_fit(plan, [](std::size_t) { return true; });
       ADD_FAILURE() << rays;
     } catch (const ParameterError& error) {
-      EXPECT_EQ(error.parameter, "/experiments/0/matrix/rays");
+      EXPECT_EQ(error.parameter, "c.json: /experiments/0/matrix/rays");
       const std::string message = error.what();
       EXPECT_NE(message.find(" rays, with those of the cells before them, take at least "), std::string::npos) << message;
       EXPECT_NE(message.find("make fewer rays"), std::string::npos) << message;
@@ -105,7 +105,7 @@ TEST_F(HostileFiles, RaysAreCountedBeforeTheyAreMade) {
         fmt::format("ulimit -v 4000000; cd '{}' && '{}' {} >out 2>err", folder_.string(), NULLMARK_PROGRAM, command);
     EXPECT_EQ(WEXITSTATUS(std::system(limited.c_str())), static_cast<int>(ExitCode::input_error));
     const std::string error = read("err");
-    EXPECT_EQ(error.rfind("nullmark: /experiments/0/matrix/rays: 268435456 rays", 0), 0u) << error;
+    EXPECT_EQ(error.rfind("nullmark: c.json: /experiments/0/matrix/rays: 268435456 rays", 0), 0u) << error;
     EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << error;
   }
 }
