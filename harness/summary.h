@@ -24,6 +24,9 @@ struct Summary {
 /// or no cell that passed 77; else 0.
 Summary summarise(RunRecord& run);
 
+/// Why a cell is not PASS: of its status, its verdict, lookups above the bound and laws.
+std::string reason_of(const CellRecord& record);
+
 /// Text for a cell of a markdown table.
 std::string escaped(const std::string& text);
 
