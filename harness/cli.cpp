@@ -63,9 +63,9 @@ void warn(const std::string& file, const std::optional<std::string>& remark) {
 void expect_one_of(const std::string& word, const std::vector<std::string>& names, const char* what) {
   if (std::find(names.begin(), names.end(), word) != names.end()) return;
   const std::string near = nearest(word, names);
-  throw InputError(fmt::format("unknown {} \"{}\"; {}", what, word,
-                               near.empty() ? fmt::format("expected one of {}", fmt::join(names, ", "))
-                                            : fmt::format("did you mean \"{}\"?", near)));
+  throw InputError(fmt::format(
+      "unknown {} \"{}\"; {}", what, word,
+      near.empty() ? fmt::format("expected one of {}", fmt::join(names, ", ")) : fmt::format("did you mean \"{}\"?", near)));
 }
 
 /// The commands of the program, what they take, and what the user asked of them.

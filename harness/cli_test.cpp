@@ -55,7 +55,8 @@ TEST_F(Cli, NoOutputReplacesAnInputOrAnotherOutput) {
   EXPECT_EQ(read("c.json"), config);
   EXPECT_EQ(read("folder/d.json"), config);
   EXPECT_EQ(read("v.vdb"), "a volume");
-  for (const char* absent : {"c.html", "new.html", "x", "c.json.journal"}) EXPECT_FALSE(std::filesystem::exists(folder_ / absent));
+  for (const char* absent : {"c.html", "new.html", "x", "c.json.journal"})
+    EXPECT_FALSE(std::filesystem::exists(folder_ / absent));
 }
 
 TEST_F(Cli, StandardOutputCarriesOnlyTheResults) {
@@ -194,7 +195,8 @@ TEST_F(Cli, FiguresWithoutABrowserAreRefusedAtOnce) {
   const char* path = std::getenv("PATH");
   const std::string before = path ? path : "";
   ::setenv("PATH", folder_.c_str(), 1);
-  const std::string command = fmt::format("cd '{}' && '{}' report r.json -o r.html --figures f 2>err", folder_.string(), NULLMARK_PROGRAM);
+  const std::string command =
+      fmt::format("cd '{}' && '{}' report r.json -o r.html --figures f 2>err", folder_.string(), NULLMARK_PROGRAM);
   const int status = std::system(command.c_str());
   ::setenv("PATH", before.c_str(), 1);
   EXPECT_EQ(WEXITSTATUS(status), code(ExitCode::input_error));

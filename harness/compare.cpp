@@ -83,7 +83,8 @@ std::string ends_shown(const Interval& x) { return fmt::format("[{:.3g}, {:.3g}]
 std::vector<Line> pairs(const Contest& contest) {
   const bool floors = std::any_of(contest.pairings.begin(), contest.pairings.end(),
                                   [](const Pairing& pairing) { return pairing.of_the_means.has_value(); });
-  Line heading = {"estimator", "mean squared error of 1 sample / baseline's, same streams", "interval if streams were independent"};
+  Line heading = {"estimator", "mean squared error of 1 sample / baseline's, same streams",
+                  "interval if streams were independent"};
   if (floors) heading.push_back(fmt::format("of {} samples, bias included", contest.pairings[0].samples));
   std::vector<Line> lines = {heading};
   for (const Pairing& pairing : contest.pairings) {

@@ -235,9 +235,9 @@ std::vector<Contest> contests(const std::vector<RunRecord>& runs, const std::str
   const auto has_baseline = [](const Contest& contest) { return contest.baseline.has_value(); };
   if (!baseline.empty() && std::none_of(all.begin(), all.end(), has_baseline)) {
     const std::string near = nearest(baseline, known);
-    throw InputError(fmt::format("--baseline: no cell of the results has the estimator \"{}\"{}", baseline,
-                                 near.empty() ? fmt::format("; they have {}", fmt::join(types, ", "))
-                                              : fmt::format("; did you mean \"{}\"?", near)));
+    throw InputError(fmt::format(
+        "--baseline: no cell of the results has the estimator \"{}\"{}", baseline,
+        near.empty() ? fmt::format("; they have {}", fmt::join(types, ", ")) : fmt::format("; did you mean \"{}\"?", near)));
   }
   return all;
 }

@@ -34,8 +34,8 @@ struct Contender {
 struct Pairing {
   std::size_t contender = 0, against = 0;
   Interval ratio, unpaired;
-  std::uint64_t samples = 0;            ///< of a ray in the run
-  std::optional<Interval> of_the_means; ///< the ratio at so many samples, where either has a floor and both costs are known
+  std::uint64_t samples = 0;             ///< of a ray in the run
+  std::optional<Interval> of_the_means;  ///< the ratio at so many samples, where either has a floor and both costs are known
 };
 
 /// A contender that has no Pairing with the baseline, and why.

@@ -25,9 +25,9 @@ std::vector<std::pair<std::uint64_t, Interval>> times_by_batch(const TimeRecord&
   for (const BatchTime& batch : time.batches)
     if (batch.samples_per_traversal < time.samples_per_traversal && batch.ns_per_sample > 0)
       // Median absolute deviation to standard error of a median, for normal scatter.
-      times.emplace_back(batch.samples_per_traversal,
-                         relative(batch.ns_per_sample,
-                                  1.4826 * 1.2533 * batch.mad / batch.ns_per_sample / std::sqrt(time.repetitions)));
+      times.emplace_back(
+          batch.samples_per_traversal,
+          relative(batch.ns_per_sample, 1.4826 * 1.2533 * batch.mad / batch.ns_per_sample / std::sqrt(time.repetitions)));
   times.emplace_back(time.samples_per_traversal, main);
   return times;
 }
