@@ -1,6 +1,7 @@
 #include "harness/cli.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -16,8 +17,10 @@
 #include "harness/json_input.h"
 #include "harness/junit.h"
 #include "harness/merge.h"
+#include "harness/outputs.h"
 #include "harness/provenance.h"
 #include "harness/registry.h"
+#include "harness/remarks.h"
 #include "harness/results_json.h"
 #include "harness/schema.h"
 #include "harness/stability.h"
@@ -53,6 +56,19 @@ std::vector<RunRecord> load_all(const std::vector<std::string>& files) {
   return runs;
 }
 
+void warn(const std::string& file, const std::optional<std::string>& remark) {
+  if (remark) fmt::print(stderr, "nullmark: warning: {}: {}\n", file, one_line(*remark));
+}
+
+/// Throws InputError where the word is none of the names.
+void expect_one_of(const std::string& word, const std::vector<std::string>& names, const char* what) {
+  if (std::find(names.begin(), names.end(), word) != names.end()) return;
+  const std::string near = nearest(word, names);
+  throw InputError(fmt::format(
+      "unknown {} \"{}\"; {}", what, word,
+      near.empty() ? fmt::format("expected one of {}", fmt::join(names, ", ")) : fmt::format("did you mean \"{}\"?", near)));
+}
+
 /// The commands of the program, what they take, and what the user asked of them.
 class CommandLine {
  public:
@@ -75,7 +91,11 @@ class CommandLine {
 
   ExitCode execute() {
     const std::vector<std::string>& words = run_.command_line;
-    if (words.size() > 1) refuse_unknown_command(words[1]);
+    if (words.size() <= 1) {
+      fmt::print("{}", app_.help());
+      return ExitCode::ok;
+    }
+    refuse_unknown_command(words[1]);
     std::vector<std::string> reversed(words.rbegin(), words.rend() - 1);
     try {
       app_.parse(reversed);
@@ -91,10 +111,7 @@ class CommandLine {
   void refuse_unknown_command(const std::string& word) const {
     std::vector<std::string> names;
     for (const CLI::App* command : app_.get_subcommands({})) names.push_back(command->get_name());
-    if (word.rfind('-', 0) == 0 || std::find(names.begin(), names.end(), word) != names.end()) return;
-    const std::string near = nearest(word, names);
-    throw InputError(fmt::format("unknown command \"{}\"; {}", word,
-                                 near.empty() ? "--help lists them" : fmt::format("did you mean \"{}\"?", near)));
+    if (word.rfind('-', 0) != 0) expect_one_of(word, names, "command");
   }
 
   template <class Action>
@@ -130,9 +147,11 @@ class CommandLine {
 
   void add_check() {
     CLI::App* command = add("check", "Verdicts on bias and expected lookups, derived from the results file alone", [this] {
+      refuse_overwriting({file_}, {junit_, markdown_});
       RunRecord run = load_all({file_})[0];
       const Summary summary = summarise(run);
       if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
+      warn(file_, version_remark(run));
       if (!markdown_.empty())
         write_atomically(markdown_, summary_markdown(run, summary, file_) + (cases_ ? "\n" + stability_markdown(run) : ""));
       if (cases_) fmt::print("{}\n", stability_text(run));
@@ -148,9 +167,11 @@ class CommandLine {
 
   void add_compare() {
     CLI::App* command = add("compare", "Rank estimators by what accuracy costs in time", [this] {
+      refuse_overwriting(files_, {markdown_});
       const std::vector<RunRecord> runs = load_all(files_);
       const std::string ranking = compare_text(runs, baseline_, paired_);
       if (ranking.empty()) return report(ExitCode::nothing_ran, "no cell of these results was sampled; nothing to compare");
+      for (std::size_t i = 0; i < runs.size(); ++i) warn(files_[i], version_remark(runs[i]));
       fmt::print("{}", ranking);
       if (!markdown_.empty()) write_atomically(markdown_, compare_markdown(runs, baseline_, paired_));
       return ExitCode::ok;
@@ -189,37 +210,39 @@ class CommandLine {
   }
 
   void add_list() {
-    CLI::App* command =
-        add("list", "List what configurations may name, with parameters and sources", [this] { return list_command(list_); });
-    command->add_option("WHAT", list_.what, "estimators, media, majorants, rays or quantities")
-        ->required()
-        ->check(CLI::IsMember({"estimators", "media", "majorants", "rays", "quantities"}));
+    CLI::App* command = add("list", "List what configurations may name, with parameters and sources", [this] {
+      expect_one_of(list_.what, {"estimators", "media", "majorants", "rays", "quantities"}, "list");
+      return list_command(list_);
+    });
+    command->add_option("WHAT", list_.what, "estimators, media, majorants, rays or quantities")->required();
     command->add_flag("--json", list_.json, "As JSON");
   }
 
   void add_schema() {
     CLI::App* command = add("schema", "Print a JSON Schema (draft-07)", [this] {
+      expect_one_of(schema_, {"config", "results"}, "schema");
       fmt::print("{}\n", (schema_ == "config" ? config_schema() : results_schema()).dump(2));
       return ExitCode::ok;
     });
-    command->add_option("WHICH", schema_, "config or results")->required()->check(CLI::IsMember({"config", "results"}));
+    command->add_option("WHICH", schema_, "config or results")->required();
   }
 
   void add_export() {
     CLI::App* command = add("export", "Write results in another program's format", [this] {
+      expect_one_of(format_, export_formats(), "format");
+      refuse_overwriting({file_}, {output_});
       const RunRecord run = load_all({file_})[0];
       deliver(export_results(run, format_, file_), output_);
       return ExitCode::ok;
     });
     command->add_option("RESULTS", file_, "Results file")->required();
-    command->add_option("--format", format_, "google-benchmark, csv, jsonl or junit")
-        ->required()
-        ->check(CLI::IsMember(export_formats()));
+    command->add_option("--format", format_, "google-benchmark, csv, jsonl or junit")->required();
     command->add_option("-o,--output", output_, "File; default standard output");
   }
 
   void add_merge() {
     CLI::App* command = add("merge", "Join the results of shards", [this] {
+      refuse_overwriting(files_, {output_});
       if (!force_ && output_ != "-" && std::filesystem::exists(output_))
         throw InputError(output_ + ": exists; --force replaces it");
       deliver(results_text(merge_results(load_all(files_), files_)), output_);

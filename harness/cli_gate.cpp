@@ -5,6 +5,7 @@
 #include "harness/commands.h"
 #include "harness/file_io.h"
 #include "harness/json_input.h"
+#include "harness/outputs.h"
 #include "harness/performance_gate_baseline.h"
 #include "harness/performance_gate_report.h"
 #include "harness/performance_gate_wall_time.h"
@@ -47,6 +48,7 @@ ExitCode update(const GateCommand& command, const Counts& fresh, std::optional<R
 }  // namespace
 
 ExitCode gate_command(const GateCommand& command) {
+  refuse_overwriting({command.results, command.baseline, command.blocks}, {command.junit, command.markdown});
   const Counts fresh = read_counts(command.results);
   std::optional<Real> threshold;
   if (command.threshold) threshold = *command.threshold / 100;

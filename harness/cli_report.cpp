@@ -3,6 +3,7 @@
 #include "harness/commands.h"
 #include "harness/compare.h"
 #include "harness/file_io.h"
+#include "harness/outputs.h"
 #include "harness/report/data.h"
 #include "harness/report/figures.h"
 #include "harness/report/page.h"
@@ -11,6 +12,8 @@
 namespace nullmark {
 
 ExitCode report_command(const ReportCommand& command) {
+  refuse_overwriting(command.results, {command.output, command.markdown});
+  if (!command.figures.empty()) expect_figures_possible(command.figures);
   std::vector<RunRecord> runs;
   for (const std::string& file : command.results) runs.push_back(read_results(read_file(file), file));
   std::string words = "nullmark report";

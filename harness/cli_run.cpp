@@ -6,6 +6,7 @@
 #include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <random>
@@ -17,12 +18,14 @@
 #include "harness/config.h"
 #include "harness/file_io.h"
 #include "harness/journal.h"
+#include "harness/outputs.h"
 #include "harness/progress.h"
 #include "harness/provenance.h"
 #include "harness/results_json.h"
 #include "harness/run.h"
 #include "harness/spec_json.h"
 #include "harness/table.h"
+#include "harness/variables.h"
 
 namespace nullmark {
 namespace {
@@ -170,6 +173,24 @@ Earlier earlier_results(const Plan& plan, const std::string& output, const Journ
   return earlier;
 }
 
+/// Files that the run reads: configurations and the volumes of its media.
+std::vector<std::string> inputs_of(const std::vector<ConfigSource>& sources, const Plan& plan) {
+  std::vector<std::string> files;
+  for (const ConfigSource& source : sources) files.push_back(source.file);
+  const std::function<void(const MediumSpec&)> add = [&](const MediumSpec& medium) {
+    if (const auto file = medium.field.values.find("file"); file != medium.field.values.end())
+      if (const auto* path = std::get_if<std::string>(&file->second)) try {
+          files.push_back(with_variables(*path));
+        } catch (const MissingData&) {
+          // Then there is no file to protect.
+        }
+    for (const auto* others : {&medium.per_channel, &medium.emission_field})
+      for (const MediumSpec& other : *others) add(other);
+  };
+  for (const MediumSpec& medium : plan.media) add(medium);
+  return files;
+}
+
 ExitCode outcome(const std::vector<CellRecord>& cells) {
   if (received_signal != 0) return received_signal == SIGINT ? ExitCode::interrupted : ExitCode::terminated;
   bool any_ok = false;
@@ -208,6 +229,7 @@ ExitCode run_command(const RunCommand& command) {
   std::unique_ptr<Journal> journal;
   Earlier earlier;
   if (!to_stdout) {
+    refuse_overwriting(inputs_of(sources, plan), {output, Journal::path_for(output)});
     if (std::filesystem::is_directory(output)) throw InputError(output + ": is a folder; expected the path of a results file");
     using Mode = Journal::Mode;
     journal = std::make_unique<Journal>(output, config_hash(plan.config_text),

@@ -27,6 +27,38 @@ TEST_F(Cli, RunWritesResultsAndRefusesToReplaceThem) {
   EXPECT_EQ(run("run c.json --force"), 0);
 }
 
+TEST_F(Cli, NoOutputReplacesAnInputOrAnotherOutput) {
+  ASSERT_EQ(run("run c.json -o a.json"), 0) << read("err");
+  ASSERT_EQ(run("run c.json -o b.json"), 0) << read("err");
+  std::filesystem::create_symlink("a.json", folder_ / "link");
+  std::filesystem::create_hard_link(folder_ / "a.json", folder_ / "hard");
+  std::filesystem::create_symlink("new.html", folder_ / "dangling");
+  std::filesystem::create_directory(folder_ / "folder");
+  std::filesystem::copy_file(folder_ / "c.json", folder_ / "folder/d.json");
+  write("v.vdb", "a volume");
+  write("v.json", R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
+      "matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"v.vdb"}}}]})");
+  const std::string before = read("a.json"), config = read("c.json");
+  for (const char* arguments :
+       {"report a.json -o a.json", "report a.json -o ./folder/../a.json", "report a.json b.json -o link", "report a.json -o hard",
+        "report a.json -o c.html --markdown c.html", "report a.json -o new.html --markdown dangling",
+        "compare a.json b.json --markdown a.json", "check a.json --junit a.json", "check a.json --junit x --markdown ./x",
+        "export a.json --format csv -o a.json", "merge a.json b.json -o a.json --force", "run c.json -o c.json --force",
+        "run folder -o folder/d.json --force", "run v.json -o v.vdb --force", "gate --baseline a.json b.json --junit a.json"}) {
+    EXPECT_EQ(run(arguments), code(ExitCode::input_error)) << arguments;
+    const std::string error = read("err");
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << arguments << ": " << error;
+    EXPECT_NE(error.find("give "), std::string::npos) << error;
+    EXPECT_EQ(read("out"), "") << arguments;
+    ASSERT_TRUE(read("a.json") == before) << arguments;
+  }
+  EXPECT_EQ(read("c.json"), config);
+  EXPECT_EQ(read("folder/d.json"), config);
+  EXPECT_EQ(read("v.vdb"), "a volume");
+  for (const char* absent : {"c.html", "new.html", "x", "c.json.journal"})
+    EXPECT_FALSE(std::filesystem::exists(folder_ / absent));
+}
+
 TEST_F(Cli, StandardOutputCarriesOnlyTheResults) {
   EXPECT_EQ(run("run - -o -", NULLMARK_PROGRAM, "c.json"), 0) << read("err");
   EXPECT_EQ(read_results(read("out"), "out").cells.size(), 6u);
@@ -121,6 +153,62 @@ TEST_F(Cli, ErrorsAreOneLineWithTheRightCode) {
   EXPECT_EQ(read("err").rfind("nullmark: clash.json: /experiments/0/matrix/medium/hi: ", 0), 0u) << read("err");
   EXPECT_EQ(run("run optional.json"), code(ExitCode::nothing_ran));
   EXPECT_EQ(results("optional.results.json").cells.at(0).status, Status::skipped);
+}
+
+TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
+  ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");
+  std::filesystem::create_directory(folder_ / "folder");
+  const std::string results_text = read("r.json");
+  write("cut.json", results_text.substr(0, results_text.size() / 2));
+  write("empty.json", "");
+  write("page.html", "<!doctype html>");
+  write("other.json", "{\"a\": 1}");
+  const std::vector<std::pair<const char*, const char*>> cases = {
+      {"check nowhere.json", "nowhere.json: no such file"},
+      {"run nowhere.json", "nowhere.json: no such file"},
+      {"check folder", "folder: is a folder"},
+      {"check c.json", "c.json: is a configuration; `nullmark run` it first"},
+      {"run r.json", "r.json: these are results; nullmark check, compare and report read them"},
+      {"check other.json", "is no results file of nullmark"},
+      {"check page.html", "is no results file of nullmark"},
+      {"check cut.json", "ends in the middle"},
+      {"check empty.json", "is empty"},
+      {"list quantites", "did you mean \"quantities\"?"},
+      {"schema confg", "did you mean \"config\"?"},
+      {"export r.json --format cvs", "did you mean \"csv\"?"},
+      {"compare r.json --baseline nosuch", "they have delta, ratio, residual_ratio"},
+      {"report r.json -o r.html --figures c.json", "--figures: c.json: "},
+      {"report r.json -o r.html --figures c.json/x", "is no folder"}};
+  for (const auto& [arguments, words] : cases) {
+    EXPECT_EQ(run(arguments), code(ExitCode::input_error)) << arguments;
+    const std::string error = read("err");
+    EXPECT_NE(error.find(words), std::string::npos) << arguments << ": " << error;
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << arguments << ": " << error;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "r.html"));
+  EXPECT_EQ(run(""), 0);
+  EXPECT_NE(read("out").find("compare"), std::string::npos);
+}
+
+TEST_F(Cli, FiguresWithoutABrowserAreRefusedAtOnce) {
+  ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");
+  const char* path = std::getenv("PATH");
+  const std::string before = path ? path : "";
+  ::setenv("PATH", folder_.c_str(), 1);
+  const std::string command =
+      fmt::format("cd '{}' && '{}' report r.json -o r.html --figures f 2>err", folder_.string(), NULLMARK_PROGRAM);
+  const int status = std::system(command.c_str());
+  ::setenv("PATH", before.c_str(), 1);
+  EXPECT_EQ(WEXITSTATUS(status), code(ExitCode::input_error));
+  EXPECT_NE(read("err").find("apt install chromium"), std::string::npos) << read("err");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "r.html"));
+}
+
+TEST_F(Cli, TimingTellsHowFarItIs) {
+  write("t.json", R"({"$schema":"nullmark/config/1","timing":{"repetitions":2,"seconds":0.0001},"experiments":[
+      {"name":"e","rays":"single","samples_per_ray":10,"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}]})");
+  ASSERT_EQ(run("run t.json"), 0) << read("err");
+  EXPECT_NE(read("err").find("timing 1/2\ntiming 2/2\n"), std::string::npos) << read("err");
 }
 
 TEST_F(Cli, ListsSchemasAndVersion) {

@@ -1,6 +1,7 @@
 #include "harness/comparison.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -115,10 +116,23 @@ bool is_named(const Contender& contender, const std::string& name) {
          contender.label == name;
 }
 
-bool on_the_same_streams(const CellRecord& a, const CellRecord& b) {
-  return !a.cell.own_streams && !b.cell.own_streams && a.cell.seed == b.cell.seed && a.rays == b.rays &&
-         a.cell.samples_per_ray == b.cell.samples_per_ray && a.cell.precision == b.cell.precision &&
-         a.squared_error_blocks.size() == BlockErrors::kBlocks && b.squared_error_blocks.size() == BlockErrors::kBlocks;
+/// Why two cells are not of the same random streams, or their errors on them not known; empty where they are.
+const char* unlike(const CellRecord& a, const CellRecord& b) {
+  if (a.cell.own_streams || b.cell.own_streams) return "draws from streams of its own";
+  if (a.cell.seed != b.cell.seed) return "has another seed";
+  if (a.rays != b.rays) return "has another number of rays";
+  if (a.cell.samples_per_ray != b.cell.samples_per_ray) return "has another number of samples";
+  if (a.cell.precision != b.cell.precision) return "has another precision";
+  for (const CellRecord* one : {&a, &b})
+    if (one->squared_error_blocks.size() != BlockErrors::kBlocks) return "has too few samples for an interval";
+  return "";
+}
+
+/// Squared errors that are no more than rounding, whose ratio tells nothing.
+bool only_rounding(const CellRecord& record, Real total) {
+  const std::optional<Cost> cost = cost_of(record);
+  const Real rounding = cost ? kRounding * cost->reference : 0;
+  return total / static_cast<Real>(BlockErrors::kBlocks) <= rounding * rounding;
 }
 
 /// Variance of log(statistic) by leaving out one block after the other [Tukey 1958].
@@ -133,23 +147,41 @@ Real jackknife_variance(const Statistic& log_without) {
   return sum * (kBlocks - 1) / kBlocks;
 }
 
-std::optional<Pairing> pairing(const std::vector<Contender>& contenders, std::size_t one, std::size_t other) {
-  const CellRecord &a = *contenders[one].record, &b = *contenders[other].record;
-  if (one == other || !on_the_same_streams(a, b)) return std::nullopt;
+std::optional<Interval> ratio_of_means(const std::optional<Cost>& a, const std::optional<Cost>& b, std::uint64_t samples) {
+  if (!a || !b || !(a->floor || b->floor)) return std::nullopt;
+  const Interval below = mean_square_error(*b, samples);
+  return below.value > 0 ? std::optional(quotient(mean_square_error(*a, samples), below)) : std::nullopt;
+}
+
+void pair_up(Contest& contest, std::size_t one, std::size_t other) {
+  const Contender &first = contest.contenders[one], &second = contest.contenders[other];
+  const CellRecord &a = *first.record, &b = *second.record;
+  if (const std::string reason = unlike(a, b); !reason.empty()) {
+    contest.unpaired.push_back({one, reason});
+    return;
+  }
   const auto total = [](const CellRecord& record) {
     return std::accumulate(record.squared_error_blocks.begin(), record.squared_error_blocks.end(), Real{0});
   };
   const Real of_a = total(a), of_b = total(b);
+  if (only_rounding(a, of_a) || only_rounding(b, of_b)) {
+    contest.unpaired.push_back({one, "is exact but for rounding, or its baseline is"});
+    return;
+  }
   const auto log_without = [&](const CellRecord& record, Real all) {
     return [&record, all](std::size_t block) { return std::log(all - record.squared_error_blocks[block]); };
   };
   const auto log_a = log_without(a, of_a), log_b = log_without(b, of_b);
   const Real paired = jackknife_variance([&](std::size_t block) { return log_a(block) - log_b(block); });
   const Real alone = jackknife_variance(log_a) + jackknife_variance(log_b);
-  if (!std::isfinite(paired) || !std::isfinite(alone)) return std::nullopt;
+  if (!std::isfinite(paired) || !std::isfinite(alone)) {
+    contest.unpaired.push_back({one, "has all its error in one of the 16 parts, which leaves no interval"});
+    return;
+  }
   static const Real kStudent = boost::math::quantile(boost::math::students_t(BlockErrors::kBlocks - 1), 0.975) / kNormal975;
-  return Pairing{one, other, relative(of_a / of_b, kStudent * std::sqrt(paired)),
-                 relative(of_a / of_b, kStudent * std::sqrt(alone))};
+  contest.pairings.push_back({one, other, relative(of_a / of_b, kStudent * std::sqrt(paired)),
+                              relative(of_a / of_b, kStudent * std::sqrt(alone)), a.cell.samples_per_ray,
+                              ratio_of_means(first.cost, second.cost, a.cell.samples_per_ray)});
 }
 
 void decide(Contest& contest, const std::vector<RunRecord>& runs, const std::string& baseline) {
@@ -169,7 +201,7 @@ void decide(Contest& contest, const std::vector<RunRecord>& runs, const std::str
     if (!contest.baseline) continue;
     if (has_time(contender) && has_time(*base))
       contender.relative = i == *contest.baseline ? exactly(1) : quotient(*contender.seconds[0], *base->seconds[0]);
-    if (const auto found = pairing(contenders, i, *contest.baseline)) contest.pairings.push_back(*found);
+    if (i != *contest.baseline) pair_up(contest, i, *contest.baseline);
   }
 }
 
@@ -179,6 +211,7 @@ std::vector<Contest> contests(const std::vector<RunRecord>& runs, const std::str
   std::vector<Contest> all;
   std::map<std::string, std::size_t> places;
   std::vector<std::string> known;
+  std::set<std::string> types;
   for (std::size_t run = 0; run < runs.size(); ++run)
     for (const CellRecord& record : runs[run].cells) {
       if (record.status != Status::ok || !record.outputs.empty()) continue;
@@ -190,17 +223,21 @@ std::vector<Contest> contests(const std::vector<RunRecord>& runs, const std::str
       contender.record = &record;
       contender.label = tracker_label(record.cell);
       contender.cost = cost_of(record);
-      for (const Real target : kTargets)
+      for (const Real target : kTargets) {
         contender.seconds.push_back(contender.cost ? seconds_to(*contender.cost, target) : std::nullopt);
+        contender.amortised.push_back(contender.cost && is_amortised(*contender.cost, target));
+      }
       known.insert(known.end(), {contender.label, record.cell.estimator.type});
+      types.insert(record.cell.estimator.type);
       all[place->second].contenders.push_back(std::move(contender));
     }
   for (Contest& contest : all) decide(contest, runs, baseline);
   const auto has_baseline = [](const Contest& contest) { return contest.baseline.has_value(); };
   if (!baseline.empty() && std::none_of(all.begin(), all.end(), has_baseline)) {
     const std::string near = nearest(baseline, known);
-    throw InputError(fmt::format("--baseline: no cell of the results has the estimator \"{}\"{}", baseline,
-                                 near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
+    throw InputError(fmt::format(
+        "--baseline: no cell of the results has the estimator \"{}\"{}", baseline,
+        near.empty() ? fmt::format("; they have {}", fmt::join(types, ", ")) : fmt::format("; did you mean \"{}\"?", near)));
   }
   return all;
 }

@@ -19,6 +19,7 @@ struct Contender {
   std::string label;  ///< the tracker, with what else tells it from others of the scene
   std::optional<Cost> cost;
   std::vector<std::optional<Interval>> seconds;  ///< to each of kTargets
+  std::vector<bool> amortised;                   ///< the same: see is_amortised
   /// 1 + those proven faster to the first target: the 95 % interval of the ratio of times lies above 1.  Equal ranks are ties.
   /// Absent where no time is known or the target is out of reach.
   std::optional<std::size_t> rank;
@@ -28,11 +29,19 @@ struct Contender {
   std::optional<BreakEven> break_even;  ///< of those with a floor, against Scene::best_unbiased
 };
 
-/// Mean squared errors of two trackers on the same random streams: the ratio's interval by a jackknife over the 16 parts that
-/// go together, and by the same jackknife of either side alone.
+/// Mean squared errors of one sample of two trackers on the same random streams: the ratio's interval by a jackknife over the 16
+/// parts that go together, and by the same jackknife of either side alone.
 struct Pairing {
   std::size_t contender = 0, against = 0;
   Interval ratio, unpaired;
+  std::uint64_t samples = 0;             ///< of a ray in the run
+  std::optional<Interval> of_the_means;  ///< the ratio at so many samples, where either has a floor and both costs are known
+};
+
+/// A contender that has no Pairing with the baseline, and why.
+struct Unpaired {
+  std::size_t contender = 0;
+  std::string reason;
 };
 
 /// Cells that differ in nothing but the tracker (its precision and seed included), by time to the first target.
@@ -42,6 +51,7 @@ struct Contest {
   std::optional<std::size_t> baseline;       ///< the first that is unbiased, or the one asked for
   std::optional<std::size_t> best_unbiased;  ///< least variance x time among those that claim to be unbiased and vary
   std::vector<Pairing> pairings;             ///< of all others with the baseline, where their streams are the same
+  std::vector<Unpaired> unpaired;            ///< those others whose streams are not, or whose errors are not known
 };
 
 /// All contests of some results, in the order of their first cells.  `baseline` is a tracker's type or label, or empty.  Throws

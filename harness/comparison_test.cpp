@@ -102,6 +102,29 @@ TEST(Cost, AMarchThatCostsMoreThanTheNoiseIsWorthIsNeverCheaper) {
   EXPECT_EQ(break_even(*cost_of(marching(0.5, 0, 1000)), *cost_of(cell("ratio")))->kind, BreakEven::Kind::never_cheaper);
 }
 
+TEST(Cost, FewSamplesCostWhatAsFewCostWhenTheyWereTimed) {
+  CellRecord record = cell("exact", 0);
+  record.time->samples_per_traversal = 64;
+  // One sample is enough, but 64 shared a walk through the majorant structure.
+  EXPECT_NEAR(seconds_to(*cost_of(record), 0.01)->value, 10e-9, 1e-18);
+  EXPECT_TRUE(is_amortised(*cost_of(record), 0.01));
+  record.time->repetitions = 3;
+  record.time->batches = {{1, 120, 1}, {8, 30, 1}, {64, 10, 1}};
+  EXPECT_NEAR(seconds_to(*cost_of(record), 0.01)->value, 120e-9, 1e-18);
+  EXPECT_FALSE(is_amortised(*cost_of(record), 0.01));
+  record.channel[0].variance_theory = 20 * 0.01 * 0.01 * 0.25;
+  EXPECT_NEAR(seconds_to(*cost_of(record), 0.01)->value, 20 * 30e-9, 1e-15);
+  record.channel[0].variance_theory = 0.04;
+  EXPECT_NEAR(seconds_to(*cost_of(record), 0.01)->value, 1600 * 10e-9, 1e-15);
+}
+
+TEST(Cost, RoundingIsNoVarianceAndNoFloor) {
+  EXPECT_EQ(cost_of(cell("ratio", 1e-26))->variance.value, 0);
+  const Cost cost = *cost_of(marching(1e-13, 1e-28));
+  EXPECT_EQ(cost.floor->high, 0);
+  EXPECT_EQ(break_even(cost, *cost_of(cell("ratio")))->kind, BreakEven::Kind::exact);
+}
+
 TEST(Comparison, TiesAreTimesWhoseRatioMayBeOne) {
   const Contest contest =
       only_contest({cell("slow", 0.04, 20), cell("ratio", 0.04, 10), cell("same", 0.04, 10.1), cell("exact", 0, 5)});
@@ -150,8 +173,35 @@ TEST(Comparison, CommonStreamsMakeRatiosOfErrorsSharper) {
   EXPECT_NEAR(contest.pairings[0].ratio.value, 4, 1e-12);
   EXPECT_NEAR(contest.pairings[0].ratio.high, 4, 1e-9);
   EXPECT_GT(contest.pairings[0].unpaired.high, 4.5);
+  EXPECT_FALSE(contest.pairings[0].of_the_means);
   b.cell.seed = 2;
-  EXPECT_TRUE(only_contest({a, b}, "a").pairings.empty());
+  const Contest other = only_contest({a, b}, "a");
+  EXPECT_TRUE(other.pairings.empty());
+  ASSERT_EQ(other.unpaired.size(), 1u);
+  EXPECT_EQ(other.unpaired[0].reason, "has another seed");
+}
+
+TEST(Comparison, TheErrorOfOneSampleDoesNotSpeakForAMarchWithAFloor) {
+  // Variance .04 against none, floor .05 * .5: at one sample 64 times the march's error, of 100 samples 1 / 1.56 of it.
+  CellRecord unbiased = cell("ratio"), march = marching(0.05);
+  for (std::size_t i = 0; i < BlockErrors::kBlocks; ++i) {
+    unbiased.squared_error_blocks.push_back(0.04 * (i % 2 == 0 ? 0.9 : 1.1));
+    march.squared_error_blocks.push_back(0.025 * 0.025);
+  }
+  const Contest contest = only_contest({unbiased, march});
+  ASSERT_EQ(contest.pairings.size(), 1u);
+  EXPECT_NEAR(contest.pairings[0].ratio.value, 1. / 64, 1e-9);
+  EXPECT_NEAR(contest.pairings[0].of_the_means->value, 0.025 * 0.025 / (0.04 / 100), 1e-9);
+  std::vector<RunRecord> runs(1);
+  runs[0].cells = {unbiased, march};
+  for (const std::string& text : {compare_text(runs, "", true), compare_markdown(runs, "", true)}) {
+    EXPECT_NE(text.find("mean squared error of 1 sample"), std::string::npos) << text;
+    EXPECT_NE(text.find("of 100 samples, bias included"), std::string::npos) << text;
+    EXPECT_NE(text.find("interval if streams were independent"), std::string::npos) << text;
+    EXPECT_NE(text.find("1.56"), std::string::npos) << text;
+  }
+  runs[0].cells[1].cell.seed = 7;
+  EXPECT_NE(compare_text(runs, "", true).find("not paired: ray_marching has another seed"), std::string::npos);
 }
 
 /// 200 runs of real trackers whose ratio of mean squared errors is known: (ratio's variance) / (delta's variance).  The
@@ -199,6 +249,13 @@ TEST(Compare, TablesTellTiesFloorsAndBreakEven) {
   EXPECT_EQ(text.find("same streams"), std::string::npos) << text;
   EXPECT_NE(compare_markdown(runs, "", false).find("| 2= | ratio |"), std::string::npos) << compare_markdown(runs, "", false);
   EXPECT_TRUE(compare_text({}, "", false).empty());
+}
+
+TEST(Compare, TheConfigurationsTablesComeWithIt) {
+  const std::vector<RunRecord> runs = {example_results()};
+  EXPECT_NE(compare_text(runs, "", false).find("T (rmse)\n"), std::string::npos);
+  EXPECT_NE(compare_markdown(runs, "", false).find("**T (rmse)**\n\n|  | paper | here | theory | note |"), std::string::npos)
+      << compare_markdown(runs, "", false);
 }
 
 }  // namespace

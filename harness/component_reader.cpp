@@ -1,6 +1,7 @@
 #include "harness/component_reader.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -104,6 +105,15 @@ std::string read_type(ComponentKind kind, const Place& place) {
 /// Keys that any medium takes beside its type's own.
 const std::vector<std::string> kMatterKeys = {"albedo", "anisotropy", "emission", "optional"};
 
+/// Media whose optical depth no parameter sets have others that do.
+void tell_of_extinction(const Place& place, const std::string& type, const std::vector<ParameterInfo>& parameters) {
+  std::vector<std::string> names;
+  for (const ParameterInfo& parameter : parameters)
+    if (parameter.unit == "1/length") names.push_back("\"" + parameter.name + "\"");
+  if (!names.empty())
+    place.fail(fmt::format("{} has no optical_depth; its extinction is set by {}", type, fmt::join(names, ", ")));
+}
+
 /// Components with the values that are given; `extra` keys are someone else's.
 std::vector<Component> read_given(ComponentKind kind, const Place& place, const std::vector<std::string>& extra = {}) {
   Component first;
@@ -120,6 +130,7 @@ std::vector<Component> read_given(ComponentKind kind, const Place& place, const 
     const auto named = [&name = key](const ParameterInfo& parameter) { return parameter.name == name; };
     const auto parameter = std::find_if(parameters.begin(), parameters.end(), named);
     if (parameter == parameters.end()) {
+      if (kind == ComponentKind::medium && key == "optical_depth") tell_of_extinction(place[key], first.type, parameters);
       if (key.rfind("x-", 0) != 0 && std::find(keys.begin(), keys.end(), key) == keys.end())
         place[key].unknown(fmt::format("parameter of {}", first.type), key, keys);
       continue;

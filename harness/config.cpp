@@ -514,6 +514,8 @@ DraftTable read_table(const Place& place, const std::vector<Draft>& drafts, cons
 DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> seed) {
   const Json json = parse_json(source.text, source.file);
   const Place top(json, source.file);
+  if (json.is_object() && json.contains("nullmark_schema"))
+    throw InputError(source.file + ": these are results; nullmark check, compare and report read them");
   top.expect_object();
   if (json.empty() || json.begin().key() != "$schema")
     top.fail(fmt::format("found {}; expected the first key \"$schema\": \"{}\"",
@@ -634,7 +636,8 @@ std::vector<ConfigSource> load_configs(const std::vector<std::string>& paths) {
   std::vector<ConfigSource> sources;
   const auto load = [&](const fs::path& path) {
     std::ifstream in(path, std::ios::binary);
-    if (!in) throw InputError(path.string() + ": cannot be read; expected a configuration file");
+    if (!in)
+      throw InputError(path.string() + (fs::exists(path) ? ": cannot be read; expected a configuration file" : ": no such file"));
     sources.push_back({all(in), path.string()});
   };
   for (const std::string& path : paths) {

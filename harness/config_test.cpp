@@ -182,6 +182,8 @@ TEST(Config, ErrorsAreOneLineWithPlaceAndRemedy) {
        R"(t.json: /experiments/0/matrix/estimator/1: unknown estimator "ratoi"; did you mean "ratio"?)"},
       {matrix(R"({"type":"residual_ratio","contrl":"average"})", R"("linear")"),
        R"(t.json: /experiments/0/matrix/estimator/contrl: unknown parameter of residual_ratio "contrl"; did you mean "control"?)"},
+      {matrix(R"("ratio")", R"({"type":"fractal_noise","optical_depth":2})"),
+       R"(t.json: /experiments/0/matrix/medium/optical_depth: fractal_noise has no optical_depth; its extinction is set by "peak")"},
       {matrix(R"({"type":"residual_ratio","control":["minimum","averge"]})", R"("linear")"),
        R"(t.json: /experiments/0/matrix/estimator/control/1: unknown control "averge"; did you mean "average"?)"},
       {matrix(R"("ratio")", R"({"type":"linear","end":-1})"),

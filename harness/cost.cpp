@@ -16,7 +16,20 @@ Interval floor_of(const CellRecord& record, Real mean_square_error, Real varianc
   const Real bias_square = std::max<Real>(0, mean_square_error - noise);
   const Real half = kNormal975 * std::sqrt(2 * square(noise) / rays + 4 * bias_square * noise / rays);
   const auto root = [&](Real x) { return std::sqrt(std::max<Real>(0, x)) / reference; };
-  return {root(bias_square), root(mean_square_error - noise - half), root(bias_square + half)};
+  const Interval floor{root(bias_square), root(mean_square_error - noise - half), root(bias_square + half)};
+  return floor.high <= kRounding ? Interval{} : floor;
+}
+
+std::vector<std::pair<std::uint64_t, Interval>> times_by_batch(const TimeRecord& time, const Interval& main) {
+  std::vector<std::pair<std::uint64_t, Interval>> times;
+  for (const BatchTime& batch : time.batches)
+    if (batch.samples_per_traversal < time.samples_per_traversal && batch.ns_per_sample > 0)
+      // Median absolute deviation to standard error of a median, for normal scatter.
+      times.emplace_back(
+          batch.samples_per_traversal,
+          relative(batch.ns_per_sample, 1.4826 * 1.2533 * batch.mad / batch.ns_per_sample / std::sqrt(time.repetitions)));
+  times.emplace_back(time.samples_per_traversal, main);
+  return times;
 }
 
 }  // namespace
@@ -43,9 +56,12 @@ std::optional<Cost> cost_of(const CellRecord& record) {
   Cost cost;
   cost.analytic = analytic;
   cost.reference = std::sqrt(reference / channels);
-  cost.variance = relative(variance / channels, relative_error);
+  variance /= channels;
+  if (variance <= square(kRounding * cost.reference)) variance = 0;
+  cost.variance = relative(variance, relative_error);
   if (record.lookups_per_sample) cost.variance_x_lookups = product(cost.variance, exactly(*record.lookups_per_sample));
   if (record.time) cost.ns_per_sample = median_interval(record.time->repetition_ns);
+  if (cost.ns_per_sample) cost.ns_by_batch = times_by_batch(*record.time, *cost.ns_per_sample);
   if (cost.ns_per_sample) cost.variance_x_ns = product(cost.variance, *cost.ns_per_sample);
   // Samples that are clamped or rounded are biased whatever their tracker is.
   const bool claims_unbiased = record.claims == "unbiased" || record.claims == "exact";
@@ -68,7 +84,21 @@ std::optional<Interval> seconds_to(const Cost& cost, Real target) {
   if (!cost.ns_per_sample) return std::nullopt;
   const Interval samples = samples_to(cost, target);
   if (!std::isfinite(samples.value)) return samples;
-  return product(product(samples, *cost.ns_per_sample), exactly(1e-9));
+  const Interval* ns = &cost.ns_by_batch.front().second;
+  for (const auto& [size, time] : cost.ns_by_batch)
+    if (static_cast<Real>(size) <= samples.value) ns = &time;
+  return product(product(samples, *ns), exactly(1e-9));
+}
+
+bool is_amortised(const Cost& cost, Real target) {
+  return cost.ns_per_sample && samples_to(cost, target).value < static_cast<Real>(cost.ns_by_batch.front().first);
+}
+
+Interval mean_square_error(const Cost& cost, std::uint64_t samples) {
+  const Interval floor = cost.floor.value_or(Interval{});
+  const auto n = static_cast<Real>(samples);
+  const auto error = [&](Real variance, Real bias) { return variance / n + square(bias * cost.reference); };
+  return {error(cost.variance.value, floor.value), error(cost.variance.low, floor.low), error(cost.variance.high, floor.high)};
 }
 
 std::optional<BreakEven> break_even(const Cost& biased, const Cost& unbiased) {
@@ -79,6 +109,10 @@ std::optional<BreakEven> break_even(const Cost& biased, const Cost& unbiased) {
   };
   const Interval &u = *unbiased.variance_x_ns, &b = *biased.variance_x_ns, &floor = *biased.floor;
   BreakEven result;
+  if (floor.high == 0) {
+    result.kind = BreakEven::Kind::exact;
+    return result;
+  }
   if (!(floor.low > 0)) {
     result.kind = BreakEven::Kind::no_floor_seen;
     return result;

@@ -1,11 +1,17 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "harness/interval.h"
 #include "harness/record.h"
 
 namespace nullmark {
+
+/// Relative errors below are rounding: they count as 0.
+inline constexpr Real kRounding = 1e-10;
 
 /// What accuracy costs in one cell, averaged over its channels.  n samples of a ray have the mean squared error
 /// V / n + (floor R)^2, R being the root mean square of the reference, and take n times the time of one.
@@ -14,6 +20,8 @@ struct Cost {
   Real reference = 0;                     ///< R
   Interval variance;                      ///< V, of a sample; a sample variance's interval is by its kurtosis
   std::optional<Interval> ns_per_sample;  ///< median over the repetitions
+  /// What samples cost where so few share a walk through the majorant structure, ascending; the last is ns_per_sample.
+  std::vector<std::pair<std::uint64_t, Interval>> ns_by_batch;
   std::optional<Interval> variance_x_lookups, variance_x_ns;
   /// Relative error that no number of samples removes, of estimators that do not claim to be unbiased, and of samples that are
   /// clamped or rounded; from the rays' errors.
@@ -27,14 +35,22 @@ std::optional<Cost> cost_of(const CellRecord& record);
 /// is above it.
 Interval samples_to(const Cost& cost, Real target);
 
-/// Seconds of one ray on one thread until the relative error is `target`; infinite where it never is.  Nothing without a time.
+/// Seconds of one ray on one thread until the relative error is `target`, by the time of the largest batch that was timed and is
+/// not larger than the samples needed; infinite where it never is.  Nothing without a time.
 std::optional<Interval> seconds_to(const Cost& cost, Real target);
+
+/// Fewer samples are needed than in the smallest batch that was timed: `seconds_to` leaves out part of the walk through the
+/// majorant structure.
+bool is_amortised(const Cost& cost, Real target);
+
+/// Mean squared error of n samples: V / n + (floor R)^2.
+Interval mean_square_error(const Cost& cost, std::uint64_t samples);
 
 /// When an estimator with a floor stops being cheaper than one without: from
 ///   t = (V_u s_u - V_b s_b) / (floor_b R)^2
 /// on, s being the time of a sample, the unbiased one has the smaller error in the same time.  `error` is that of both then.
 struct BreakEven {
-  enum class Kind { at, never_cheaper, no_floor_seen } kind = Kind::at;
+  enum class Kind { at, never_cheaper, no_floor_seen, exact } kind = Kind::at;  ///< exact: but for rounding
   Interval seconds, error;
 };
 /// Nothing where either has no time.

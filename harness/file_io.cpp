@@ -73,8 +73,12 @@ std::string unpacked(const std::string& packed, const std::string& path) {
 }  // namespace
 
 std::string read_file(const std::string& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) throw InputError(path + ": is a folder; expected a file");
   std::ifstream in(path, std::ios::binary);
-  if (!in || fs::is_directory(path)) throw InputError(path + ": cannot be read; expected a file");
+  if (const int reason = errno; !in)
+    throw InputError(reason == ENOENT ? path + ": no such file"
+                                      : fmt::format("{}: cannot be read: {}; expected a file", path, std::strerror(reason)));
   std::string text{std::istreambuf_iterator<char>(in), {}};
   return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path) : text;
 }

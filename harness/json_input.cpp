@@ -123,6 +123,10 @@ Json parse_json(const std::string& text, const std::string& file) {
   try {
     return Json::parse(Cursor(begin, &seen), Cursor(begin + text.size(), &seen), callback);
   } catch (const Json::parse_error& error) {
+    // The parser has then read past the last byte.
+    if (error.byte > text.size())
+      throw InputError(position(file, text, text.size()) +
+                       (text.empty() ? ": is empty; expected JSON" : ": ends in the middle; expected the whole of a JSON file"));
     throw InputError(position(file, text, std::min(text.size(), std::max<std::size_t>(error.byte, 1) - 1)) + ": " +
                      bare_message(error.what()));
   } catch (const Json::out_of_range& error) {

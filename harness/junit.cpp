@@ -6,6 +6,7 @@
 #include "harness/expectation.h"
 #include "harness/order.h"
 #include "harness/results_json.h"
+#include "harness/summary.h"
 #include "harness/verdict_json.h"
 
 namespace nullmark {
@@ -57,7 +58,7 @@ Ending ending(const CellRecord& record) {
   if (verdict.unbiased == Outcome::inconclusive || verdict.own_mean == Outcome::inconclusive)
     return {"skipped", "INCONCLUSIVE: " + verdict.reason};
   if (verdict.unbiased == Outcome::violated || verdict.own_mean == Outcome::violated)
-    return {"skipped", "VIOLATED: " + verdict.reason};
+    return {"skipped", "VIOLATED: " + reason_of(record)};
   return {};
 }
 

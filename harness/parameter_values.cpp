@@ -4,9 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <set>
 #include <type_traits>
+
+#include "harness/variables.h"
 
 namespace nullmark {
 namespace {
@@ -56,20 +57,6 @@ class Describe final : public ParameterVisitor {
     return &parameters.back();
   }
 };
-
-std::string with_variables(std::string text) {
-  constexpr std::string_view kOpening = "${NULLMARK_";
-  for (std::size_t at = 0; (at = text.find(kOpening, at)) != std::string::npos;) {
-    const std::size_t end = text.find('}', at);
-    if (end == std::string::npos) break;
-    const std::string variable = text.substr(at + 2, end - at - 2);
-    const char* value = std::getenv(variable.c_str());
-    if (!value) throw MissingData(fmt::format("environment variable {} is not set, needed by \"{}\"", variable, text));
-    text.replace(at, end + 1 - at, value);
-    at += std::string_view(value).size();
-  }
-  return text;
-}
 
 /// Gives a component's fields the values of a map; what the map leaves out keeps its default.
 class Assign final : public ParameterVisitor {

@@ -49,12 +49,15 @@ void Progress::cell_done(const CellRecord& record, std::size_t done, std::size_t
 }
 
 void Progress::timing(double fraction) {
+  // Repetitions of all cells are interleaved: so many cells' worth of them is done.
+  const auto timed = static_cast<std::size_t>(fraction * static_cast<double>(total_));
+  const std::string text = fmt::format("timing {}/{}", timed, total_);
   if (terminal_) {
-    draw(static_cast<double>(total_), fmt::format("timing, {:.0f} %", 100 * fraction));
-  } else if (!timing_told_) {
-    timing_told_ = true;
-    fmt::print(stderr, "timing\n");
+    draw(static_cast<double>(total_), text);
+  } else if (timed > timed_) {
+    fmt::print(stderr, "{}\n", text);
   }
+  timed_ = timed;
 }
 
 void Progress::warning(const std::string& message) {

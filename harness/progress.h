@@ -27,8 +27,8 @@ class Progress {
   void draw(double done, const std::string& doing);
   void clear();
 
-  std::size_t total_, done_ = 0;
-  bool terminal_, colour_, drawn_ = false, timing_told_ = false;
+  std::size_t total_, done_ = 0, timed_ = 0;
+  bool terminal_, colour_, drawn_ = false;
   Clock::time_point start_ = Clock::now(), last_drawn_{};
 };
 

@@ -126,7 +126,7 @@ TEST(ResultsJson, ErrorsAreOneLine) {
   EXPECT_EQ(error_of(text), "no error");
   EXPECT_EQ(error_of(replaced(text, "\"nullmark_schema\": 1", "\"nullmark_schema\": 2")),
             "r.json: /nullmark_schema: found 2; expected 1, the schema this program reads");
-  EXPECT_EQ(error_of("{}"), "r.json: /: \"nullmark_schema\" is missing; expected a results file of nullmark");
+  EXPECT_EQ(error_of("{}"), "r.json: is no results file of nullmark; `nullmark run` writes them");
   EXPECT_EQ(error_of(replaced(text, "\"status\":\"ok\"", "\"status\":\"okay\"")),
             "r.json: /cells/0/status: unknown status \"okay\"; expected one of \"ok\", \"skipped\", \"not_run\", \"error\"");
   EXPECT_EQ(error_of(replaced(text, "\"rays\":1,\"samples_per_ray\"", "\"rays\":-1,\"samples_per_ray\"")),

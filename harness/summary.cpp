@@ -52,11 +52,20 @@ const char* word(Kind kind) {
   return "nothing claimed";
 }
 
+std::string violations_of(const CellRecord& record) {
+  const std::string largest =
+      record.largest_violation ? fmt::format(", the largest {:.3g} times it", *record.largest_violation) : "";
+  return fmt::format("{} of {} lookups above the bound{}", record.majorant_violations, record.lookups, largest);
+}
+
+}  // namespace
+
 std::string reason_of(const CellRecord& record) {
   if (record.status != Status::ok) return record.reason;
   if (!record.verdict) return "";
   const VerdictRecord& verdict = *record.verdict;
   std::string reason = verdict.reason;
+  if (verdict.violated) reason += fmt::format("{}{}", reason.empty() ? "" : ": ", violations_of(record));
   if (verdict.lookups == Outcome::fail) {
     for (const TestRecord& test : verdict.tests)
       if (test.channel < 0)
@@ -68,6 +77,8 @@ std::string reason_of(const CellRecord& record) {
       reason += fmt::format("{}law \"{}\" is broken (log E = {:.1f})", reason.empty() ? "" : "; ", law.name, law.log_e);
   return reason;
 }
+
+namespace {
 
 std::string counts(const Summary& s) {
   return fmt::format(
@@ -91,6 +102,21 @@ std::size_t configured_cells(const RunRecord& run) {
   return cells;
 }
 
+std::size_t disabled_cells(const RunRecord& run) {
+  const Json config = Json::parse(run.config_text, nullptr, false);
+  std::size_t cells = 0;
+  if (!config.is_object() || !config.contains("experiments")) return cells;
+  for (const Json& experiment : config["experiments"]) {
+    if (!experiment.is_object() || !experiment.contains("include")) continue;
+    for (const Json& cell : experiment["include"]) {
+      if (!cell.is_object() || !cell.contains("gate")) continue;
+      const Json& gate = cell["gate"];
+      cells += gate.is_object() && gate.contains("enabled") && gate["enabled"] == false;
+    }
+  }
+  return cells;
+}
+
 std::size_t met(const std::vector<Expectation>& all) {
   return static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [](const Expectation& one) { return one.met; }));
 }
@@ -101,7 +127,10 @@ std::string families(const RunRecord& run) {
       return fmt::format(
           "at most {:g} of all runs show even one false FAIL among {} mean tests (and the same among {} of lookups)",
           record.verdict->alpha, record.verdict->family, record.verdict->lookups_family);
-  return "no cell was judged";
+  const std::size_t off = disabled_cells(run), cells = run.cells.size();
+  if (off == 0) return "no cell was judged";
+  return fmt::format("no cell was judged: the configuration disables the verdict in {} cells",
+                     off == cells ? fmt::format("all {}", cells) : fmt::format("{} of {}", off, cells));
 }
 
 }  // namespace

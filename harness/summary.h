@@ -27,6 +27,9 @@ Summary summarise(RunRecord& run);
 /// The word that `check` counts a cell by: "PASS", "INCONCLUSIVE (as planned)".
 std::string verdict_word(const CellRecord& record);
 
+/// Why a cell is not PASS: of its status, its verdict, lookups above the bound and laws.
+std::string reason_of(const CellRecord& record);
+
 /// For the terminal: counts, then every cell that did not pass with its reason.
 std::string summary_text(const RunRecord& run, const Summary& summary);
 

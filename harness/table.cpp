@@ -6,6 +6,7 @@
 #include <map>
 
 #include "harness/cell_names.h"
+#include "harness/cost.h"
 #include "harness/expectation.h"
 #include "harness/metrics.h"
 #include "harness/names.h"
@@ -37,6 +38,12 @@ std::string heading(const CellRecord& record) {
 
 bool heavy_tailed(const ChannelRecord& channel) { return channel.relative_variance && *channel.relative_variance > kHeavyTail; }
 
+/// A variance, 0 where it is no more than rounding leaves.
+std::optional<Real> unless_rounding(const ChannelRecord& channel, const std::optional<Real>& variance) {
+  const Real rounding = kRounding * channel.reference_rms.value_or(0);
+  return variance && *variance <= rounding * rounding ? std::optional<Real>(0) : variance;
+}
+
 /// The sample value, or the theory, marked, where the sample value tells little.
 std::string shown(const ChannelRecord& channel, const std::optional<Real>& value, const std::optional<Real>& theory) {
   return heavy_tailed(channel) && theory ? short_number(theory) + "*" : short_number(value);
@@ -65,8 +72,8 @@ Line channel_line(const CellRecord& record, std::size_t c) {
                 : "  " + output_name(record, c),
           shown(channel, channel.rmse, channel.rmse_theory),
           short_number(channel.bias),
-          shown(channel, channel.variance, channel.variance_theory),
-          short_number(channel.variance_theory),
+          shown(channel, unless_rounding(channel, channel.variance), unless_rounding(channel, channel.variance_theory)),
+          short_number(unless_rounding(channel, channel.variance_theory)),
           once(record.lookups_per_sample),
           once(record.lookups_theory),
           once(metric(record, "ns_per_lookup")),
@@ -112,7 +119,7 @@ const Value* value_under(const std::vector<std::pair<std::string, Value>>& row, 
   return nullptr;
 }
 
-std::string side_by_side(const Table& table, const CellsByName& cells) {
+std::vector<Line> side_by_side(const Table& table, const CellsByName& cells) {
   std::vector<std::string> given, answered;
   bool theory = false, note = false;
   for (const TableRow& row : table.rows) {
@@ -143,7 +150,7 @@ std::string side_by_side(const Table& table, const CellsByName& cells) {
     line.push_back(row.note);
     lines.push_back(std::move(line));
   }
-  return fmt::format("{} ({})\n{}", table.title, table.metric, aligned(lines, 1));
+  return lines;
 }
 
 }  // namespace
@@ -200,9 +207,16 @@ std::string results_tables(const RunRecord& run) {
   }
   if (marked)
     text += fmt::format("* theory: the relative variance is above {}, too heavy a tail for the sample's own\n\n", kHeavyTail);
-  const CellsByName cells = cells_by_name(run);
-  for (const Table& table : run.tables) text += side_by_side(table, cells) + "\n";
+  for (const auto& [title, lines] : configured_tables(run)) text += fmt::format("{}\n{}\n", title, aligned(lines, 1));
   return text;
+}
+
+std::vector<std::pair<std::string, std::vector<Line>>> configured_tables(const RunRecord& run) {
+  std::vector<std::pair<std::string, std::vector<Line>>> tables;
+  const CellsByName cells = cells_by_name(run);
+  for (const Table& table : run.tables)
+    tables.emplace_back(fmt::format("{} ({})", table.title, table.metric), side_by_side(table, cells));
+  return tables;
 }
 
 }  // namespace nullmark

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/record.h"
@@ -11,6 +12,9 @@ namespace nullmark {
 /// channel, then the configuration's own tables beside the numbers they answer.  `*` marks theory shown in place of a sample
 /// value where the distribution has too heavy a tail for that to mean much (relative variance above kHeavyTail).
 std::string results_tables(const RunRecord& run);
+
+/// The configuration's own tables alone: title and lines, the first being the heading.
+std::vector<std::pair<std::string, std::vector<std::vector<std::string>>>> configured_tables(const RunRecord& run);
 
 /// Lines of equally many words as aligned columns, the first line being the heading; the first `left` columns and the last one
 /// are set flush left, the others flush right.

@@ -30,6 +30,11 @@ MANY_CELLS = 200
 PAGE = None
 CELLS = []  # of all results, in the order of the page
 TABLES = []  # (table, cells of its run by name)
+VERSIONS = []  # of the programs that measured
+
+
+def timed():
+    return any(cell.get("time") for cell in CELLS)
 
 
 def as_list(value):
@@ -40,6 +45,8 @@ def read_results(files):
     for file in files:
         run = json.loads(pathlib.Path(file).read_text())
         CELLS.extend(run["cells"])
+        provenance = run["provenance"]
+        VERSIONS.append(f"{provenance['version']} ({provenance['git']['commit'][:7]})")
         by_name = {cell["name"]: cell for cell in run["cells"]}
         TABLES.extend((table, by_name) for table in run.get("tables", []))
 
@@ -297,6 +304,45 @@ class PageTest(unittest.TestCase):
         self.assertGreater(max(shades), 16)
         self.assertGreater(min(shades), 0)
 
+    def test_23_says_which_versions_measured_and_show(self):
+        about = self.find("#summary .about").text
+        for version in VERSIONS:
+            self.assertIn(f"Measured by {version}; page by ", about)
+        lines = self.js("report.runs[0].remarks.push('a remark'); return remarkLines().map((line) => line.textContent)")
+        self.js("report.runs[0].remarks.pop()")
+        self.assertIn("a remark", lines[-2 if not timed() else -1])
+
+    def test_24_columns_of_time_are_there_where_something_was_timed(self):
+        heads = self.js("return [...document.querySelectorAll('#ranking th, #verdicts th')].map((th) => th.textContent)")
+        self.assertEqual(any("seconds" in head or head == "ns a sample" for head in heads), timed())
+        said = self.js("return [...document.querySelectorAll('#summary .remark')].some((one) => one.textContent.startsWith('Nothing was timed'))")
+        self.assertEqual(said, not timed())
+
+    def test_25_badges_explain_and_lead_to_their_cells(self):
+        badges = self.browser.find_elements(By.CSS_SELECTOR, "#summary .totals .badge")
+        choice = Select(self.find("#verdicts select"))
+        outcomes = [option.get_attribute("value") for option in choice.options]
+        for badge in badges:
+            self.assertGreater(len(badge.get_attribute("title")), 20)
+            word = re.sub(r"^\W*\d+ ", "", badge.text)
+            self.js("arguments[0].click()", badge)
+            self.assertEqual(choice.first_selected_option.get_attribute("value"), word if word in outcomes else "")
+        choice.select_by_value("")
+        titles = self.js("return [...document.querySelectorAll('#verdicts .badge.violated')].map((one) => one.title)")
+        for title in titles:
+            self.assertRegex(title, r"lookups above the bound, the largest")
+
+    def test_26_names_begin_with_their_experiments(self):
+        several = len({cell["experiment"] for cell in CELLS}) > 1
+        names = self.js("return report.scenes.map((scene) => [scene.short, scene.experiment])")
+        self.assertTrue(all(short.startswith(experiment + ": ") == several for short, experiment in names))
+
+    def test_27_numbers_are_written_one_way(self):
+        self.assertEqual(self.js("return [withPageNumbers('T = .95: bias -.133, e.g. 1.5, a-3'), formatPercent(.22)]"),
+                         ["T = 0.95: bias −0.133, e.g. 1.5, a-3", "22\u00a0%"])
+        text = self.js("return document.getElementById('content').textContent")
+        self.assertNotRegex(text, r"to \.?\d+ %")
+
     # 3: the plots have data
 
     def test_30_every_plot_has_data(self):
@@ -345,6 +391,42 @@ class PageTest(unittest.TestCase):
                 self.assertGreater(count.get(section, 0), 0)
         for cell, result in zip(data["cells"], CELLS):
             self.assertEqual(cell["images"] is None, "layers" not in (result.get("images") or {}), result["name"])
+
+    def test_33_logarithmic_axes_have_two_labels(self):
+        self.draw_all()
+        labels = self.js("""return [...document.querySelectorAll(".graph")].flatMap((plot) =>
+            ["xaxis", "yaxis"].map((key) => plot._fullLayout[key]).filter((axis) => axis?.type === "log")
+                .map((axis) => [plot.getAttribute("aria-label"), axis._vals.filter(({ text }) => text).length]))""")
+        self.assertEqual([label for label in labels if label[1] < 2], [])
+        spans = self.js("""return [[2, 2], [2, 2.1], [1.9, 2.2], [3, 14], [1, 99], [1, 1e7]].map(([low, high]) => {
+            const axis = logAxis(currentTheme(), "", [low, high]);
+            return axis.tickvals?.length ?? 9; })""")
+        self.assertGreaterEqual(min(spans), 3)
+
+    def test_34_only_what_is_right_is_exact(self):
+        cells = json.loads(self.js("return document.getElementById('data').textContent"))["cells"]
+        still = [cell for cell in cells if cell["cost"] and cell["cost"]["variance"]["value"] == 0]
+        wrong = [cell for cell in still if (cell["cost"]["floor"] or {}).get("high")]
+        texts = self.js("return [...document.querySelectorAll('#matrix .graph')].flatMap((plot) => plot.layout?.annotations ?? []).map(({ text }) => text)")
+        if texts:
+            self.assertEqual(sum(text == "exact" for text in texts), len(still) - len(wrong))
+            self.assertEqual(sum(text.startswith("no noise,") for text in texts), len(wrong))
+        self.assertEqual(self.js("return report.cells.filter((cell) => cell.cost && isExact(cell)).length"), len(still) - len(wrong))
+        best = self.js("""return matrixOf(matrixViews.variance_x_lookups).entries.flat()
+            .filter(({ cell, relative }) => cell && relative !== null && relative < 1 && claimsUnbiased(cell)).length""")
+        self.assertEqual(best, 0)
+        self.detail = f"{len(wrong)} of {len(still)} without noise are wrong"
+
+    def test_35_fronts_are_lines_and_zeros_are_grey(self):
+        self.draw_all()
+        self.assertEqual(self.js("""return [...document.querySelectorAll("#pareto .graph")].flatMap((plot) => plot.data)
+            .filter(({ name, x }) => name === "front" && x.length < 2).length"""), 0)
+        blanks = self.js("""return [...document.querySelectorAll("#maps .graph")].filter((plot) =>
+            plot.data.some(({ z, customdata }) => z.some((row, y) => [...row].some((value, x) => Number.isNaN(value) && customdata[y][x] === 0))))
+            .map((plot) => [plot.layout.plot_bgcolor, plot.getAttribute("aria-label")])""")
+        for colour, text in blanks:
+            self.assertEqual(colour, "#9a9a9a")
+            self.assertIn("Grey: zero", text)
 
     def test_32_other_views_have_data(self):
         for section in ["error", "matrix", "scaling", "maps"]:
@@ -472,7 +554,8 @@ class PageTest(unittest.TestCase):
         names = [figure["name"] for figure in figures]
         self.assertEqual(len(set(names)), len(names))
         for figure in figures:
-            self.assertRegex(figure["name"], r"^[a-z0-9-]+$")
+            self.assertRegex(figure["name"], r"^[a-z0-9-]+-[0-9]+$")
+            self.assertTrue(any(re.sub("[^a-z0-9]+", "-", cell["experiment"].lower()) in figure["name"] for cell in CELLS) or "matrix" in figure["name"])
             self.assertTrue(figure["svg"].startswith("<svg"))
             self.assertTrue(base64.b64decode(figure["png"], validate=True).startswith(b"\x89PNG"))
         self.open("")
@@ -522,9 +605,9 @@ class OneLineEach(unittest.TestResult):
 
 
 def views():
-    """All of a page that is soon read; of a large one, whose looks are the same, the first."""
+    """All of a page that is soon read; of a large or an untimed one, whose looks are the same, the first."""
     every = [(size, theme) for size in SIZES for theme in THEMES]
-    return every if len(CELLS) <= MANY_CELLS else every[:1]
+    return every if len(CELLS) <= MANY_CELLS and timed() else every[:1]
 
 
 def suite():

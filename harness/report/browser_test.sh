@@ -1,12 +1,15 @@
 #!/usr/bin/env bash
-# browser_test.sh PROGRAM FOLDER   has PROGRAM report on browser_test.json and on many_cells.json, and a real browser read the pages
+# browser_test.sh PROGRAM FOLDER   has PROGRAM report on browser_test.json, on a part of it without timing and on many_cells.json,
+# and a real browser read the pages
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 program=$1 folder=$2
 mkdir -p "$folder"
 code=0
-for name in browser_test many_cells; do
-  "$program" run "$here/$name.json" -o "$folder/$name.json" --force >/dev/null 2>"$folder/$name.log" || { tail -1 "$folder/$name.log" >&2; exit 1; }
+for name in browser_test untimed many_cells; do
+  config=$name options=()
+  [ $name != untimed ] || config=browser_test options=(--no-timing --filter '^depth')
+  "$program" run "$here/$config.json" "${options[@]}" -o "$folder/$name.json" --force >/dev/null 2>"$folder/$name.log" || { tail -1 "$folder/$name.log" >&2; exit 1; }
   "$program" report "$folder/$name.json" -o "$folder/$name.html"
   /usr/bin/python3 "$here/browser_test.py" "$folder/$name.html" "$folder/$name.json" || code=$?
   [ "$code" -eq 0 ] || exit "$code"

@@ -13,6 +13,7 @@
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/provenance.h"
+#include "harness/remarks.h"
 #include "harness/report/images.h"
 #include "harness/results_json.h"
 #include "harness/scaling.h"
@@ -63,7 +64,7 @@ Json verdict_json_of(const CellRecord& record) {
           {"lookups", to_string(verdict.lookups)},
           {"laws", to_string(verdict.lawful)},
           {"as_planned", verdict.planned_undecidable},
-          {"reason", verdict.reason},
+          {"reason", reason_of(record)},
           {"epsilon", number(epsilon)},
           {"log_e_fail", number(evidence)},
           {"samples_per_ray", verdict.samples_per_ray}};
@@ -77,6 +78,7 @@ Json cost_json(const Contender& contender) {
     Json entry =
         contender.seconds[i] ? interval(*contender.seconds[i]) : Json{{"value", nullptr}, {"low", nullptr}, {"high", nullptr}};
     entry["error"] = kTargets[i];
+    entry["amortised"] = contender.amortised[i];
     entry["reached"] = contender.seconds[i] && std::isfinite(contender.seconds[i]->value);
     seconds.push_back(std::move(entry));
   }
@@ -91,14 +93,10 @@ Json cost_json(const Contender& contender) {
 }
 
 /// Nanoseconds of one of `samples` samples that share a traversal; nothing where fewer were timed together than that, or others.
-std::optional<Interval> sample_time(const CellRecord& record, std::uint64_t samples) {
-  if (!record.time) return std::nullopt;
-  const TimeRecord& time = *record.time;
-  if (samples >= time.samples_per_traversal) return median_interval(time.repetition_ns);
-  for (const BatchTime& batch : time.batches)
-    if (batch.samples_per_traversal == samples)
-      // Median absolute deviation to standard error of a median, for normal scatter.
-      return relative(batch.ns_per_sample, 1.4826 * 1.2533 * batch.mad / batch.ns_per_sample / std::sqrt(time.repetitions));
+std::optional<Interval> sample_time(const Cost& cost, std::uint64_t samples) {
+  for (const auto& [size, ns] : cost.ns_by_batch)
+    if (size == samples) return ns;
+  if (!cost.ns_by_batch.empty() && samples > cost.ns_by_batch.back().first) return cost.ns_by_batch.back().second;
   return std::nullopt;
 }
 
@@ -122,7 +120,7 @@ Json convergence_json(const CellRecord& record, const std::optional<Cost>& cost)
     const auto n = static_cast<Real>(step.samples);
     const Real groups = static_cast<Real>(record.rays) * std::floor(static_cast<Real>(record.cell.samples_per_ray) / n);
     const Real scatter = groups > 0 ? std::sqrt(std::max<Real>(0, 2 + excess / n) / groups) : kInfinity;
-    const std::optional<Interval> ns = sample_time(record, step.samples);
+    const std::optional<Interval> ns = sample_time(*cost, step.samples);
     list.push_back({{"samples", step.samples},
                     {"lookups", number(record.lookups_per_sample ? std::optional(n * *record.lookups_per_sample) : std::nullopt)},
                     {"seconds", ns ? interval(product(*ns, exactly(n * 1e-9))) : Json(nullptr)},
@@ -175,6 +173,8 @@ Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& image
           {"lookups", number(record.lookups_per_sample)},
           {"lookups_theory", number(record.lookups_theory)},
           {"null_collisions", number(record.null_collisions_per_sample)},
+          {"violations", record.majorant_violations},
+          {"largest_violation", number(record.largest_violation)},
           {"draws", number(record.draws_per_sample)},
           {"time", time_json(record)},
           {"verdict", verdict_json_of(record)},
@@ -189,6 +189,8 @@ const char* word(BreakEven::Kind kind) {
       return "never cheaper";
     case BreakEven::Kind::no_floor_seen:
       return "no floor seen";
+    case BreakEven::Kind::exact:
+      return "exact but for rounding";
     case BreakEven::Kind::at:
       break;
   }
@@ -358,6 +360,8 @@ Json run_json(RunRecord& run, const std::string& file) {
   const std::string name = std::filesystem::path(file).filename().string();
   return {{"name", run.name},
           {"file", name},
+          {"version", measured_by(run)},
+          {"remarks", Json::array()},
           {"config_hash", config_hash(run.config_text)},
           {"commands", {command_line(provenance), "nullmark check " + name, "nullmark compare " + name}},
           {"provenance", std::move(provenance)},
@@ -399,6 +403,7 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
   const std::vector<Contest> all = contests(runs, baseline);
   json["scenes"] = Json::array();
   json["paired"] = Json::array();
+  json["unpaired"] = Json::array();
   for (std::size_t scene = 0; scene < all.size(); ++scene) {
     json["scenes"].push_back(scene_json(all[scene], places));
     for (const Contender& contender : all[scene].contenders) {
@@ -412,17 +417,30 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
                                 {"cell", places.at(all[scene].contenders[pairing.contender].record)},
                                 {"against", places.at(all[scene].contenders[pairing.against].record)},
                                 {"ratio", interval(pairing.ratio)},
-                                {"unpaired", interval(pairing.unpaired)}});
+                                {"unpaired", interval(pairing.unpaired)},
+                                {"samples", pairing.samples},
+                                {"of_the_means", interval(pairing.of_the_means)}});
+    for (const Unpaired& one : all[scene].unpaired)
+      json["unpaired"].push_back(
+          {{"scene", scene}, {"cell", places.at(all[scene].contenders[one.contender].record)}, {"reason", one.reason}});
   }
   json["title"] = title;
-  json["version"] = version_line();
+  json["version"] = this_version();
   json["command"] = command;
   json["credits"] = shown;
   json["matrix"] = matrix_json(all, places);
   json["scaling"] = scaling_json(runs, places);
   json["images"] = images.json();
-  for (const auto& [file, reason] : images.missing())
-    data.warnings.push_back(fmt::format("{}: its pictures are left out: {}", file, reason));
+  for (std::size_t run = 0; run < runs.size(); ++run) {
+    if (const auto remark = version_remark(runs[run])) data.warnings.push_back(files[run] + ": " + *remark);
+    const auto missing = images.missing().find(files[run]);
+    if (missing == images.missing().end()) continue;
+    const std::string remedy =
+        fmt::format("keep {} beside {}, or make both again: {}", missing->second.folder,
+                    json["runs"][run]["file"].get<std::string>(), json["runs"][run]["commands"][0].get<std::string>());
+    json["runs"][run]["remarks"].push_back("its pictures are missing; " + remedy);
+    data.warnings.push_back(fmt::format("{}: its pictures are left out: {}; {}", files[run], missing->second.reason, remedy));
+  }
   return data;
 }
 

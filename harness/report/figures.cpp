@@ -38,7 +38,7 @@ std::string quoted(const std::string& text) {
 std::string find_browser() {
   for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
     if (std::system(fmt::format("command -v {} >/dev/null 2>&1", name).c_str()) == 0) return name;
-  throw InputError("--figures: no Chromium is installed, which draws them; expected the package chromium");
+  throw InputError("--figures: no Chromium is installed, which draws them; apt install chromium");
 }
 
 /// The page after its scripts have run.
@@ -57,6 +57,16 @@ std::string drawn_page(const std::string& page_file) {
 }
 
 }  // namespace
+
+void expect_figures_possible(const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path there = fs::absolute(folder, error);
+  while (!fs::exists(there, error) && there.has_relative_path()) there = there.parent_path();
+  if (!fs::is_directory(there, error))
+    throw InputError(fmt::format("--figures: {}: {} is no folder; give a path where one can be", folder, there.string()));
+  find_browser();
+}
 
 std::size_t write_figures(const std::string& page_file, const std::string& folder) {
   const std::string page = drawn_page(page_file);

@@ -91,7 +91,7 @@ Json ReportImages::add(const CellRecord& record, const std::string& results_file
       throw std::runtime_error(fmt::format("{}: leads out of the folder of the results", layers->second));
     image = read_exr((std::filesystem::path(results_file).parent_path() / relative).string());
   } catch (const std::exception& error) {
-    missing_.emplace(results_file, error.what());
+    missing_.emplace(results_file, Missing{relative.parent_path().string(), error.what()});
     return nullptr;
   }
   const int factor = (std::max(image.width, image.height) + kMostPixels - 1) / kMostPixels;

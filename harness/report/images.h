@@ -17,13 +17,16 @@ class ReportImages {
 
   const Json& json() const { return images_; }
 
-  /// Results whose pictures could not be read, with the reason.
-  const std::map<std::string, std::string>& missing() const { return missing_; }
+  /// Pictures of a results file that could not be read: the folder where they should be, and the reason.
+  struct Missing {
+    std::string folder, reason;
+  };
+  const std::map<std::string, Missing>& missing() const { return missing_; }
 
  private:
   Json images_ = Json::array();
   std::map<std::string, std::size_t> places_;  ///< by content
-  std::map<std::string, std::string> missing_;
+  std::map<std::string, Missing> missing_;
 };
 
 }  // namespace nullmark

@@ -6,7 +6,7 @@ const sections = [
   { id: "ranking", title: "Ranking", says: "Which tracker reaches an error soonest; = marks those that the measurements cannot tell apart. Brackets are 95 % intervals.", present: () => report.cells.some((cell) => cell.cost), build: buildRanking },
   { id: "error", title: "Error", says: "How the error falls with work: parallel to the dotted line where it is noise alone, level where bias is left.", present: () => usefulConvergenceViews().length > 0, build: buildError },
   { id: "pareto", title: "Pareto front", says: "Which trackers no other beats in both variance and time of a sample.", present: () => report.cells.some(hasParetoPoint), build: buildPareto },
-  { id: "matrix", title: "Efficiency matrix", says: "What each tracker costs in each scene; 1 is the best of the column.", present: () => usefulMatrixViews().length > 0, build: buildMatrix },
+  { id: "matrix", title: "Efficiency matrix", says: "What each tracker costs in each scene; 1 is the best unbiased one of the scene.", present: () => usefulMatrixViews().length > 0, build: buildMatrix },
   { id: "maps", title: "Maps of cost", says: "Where in the picture variance and lookups are spent.", present: () => report.cells.some(hasImages), build: buildMaps },
   { id: "strips", title: "Pictures", says: "What each tracker shows beside the truth: the reference, its estimate, and the error with its sign.", present: () => report.cells.some(hasImages), build: buildStrips },
   { id: "scaling", title: "Scaling", says: "How cost grows with what is swept; the exponent p is that of cost ~ x^p.", present: () => usefulScalingViews().length > 0, build: buildScaling },

@@ -14,7 +14,7 @@ function exactly(x) {
 /** The steps of a cell that logarithmic axes can show. */
 function stepsOf(cell, view) {
   return cell.convergence
-    .map((step) => ({ samples: step.samples, measured: step.time_measured, x: view.x(step), y: step[view.y] }))
+    .map((step) => ({ samples: step.samples, x: view.x(step), y: step[view.y] }))
     .filter(({ x, y }) => x?.value > 0 && y?.value > 0);
 }
 
@@ -34,7 +34,7 @@ function hoverOfStep(cell, view, step) {
     cell.label,
     `${convergenceTitles[view.y]}: ${formatNumber(step.y.value)}${error}`,
     `${view.xTitle}: ${formatNumber(step.x.value)}`,
-    countOf(step.samples, "sample") + (view === convergenceViews.time && !step.measured ? ", time scaled from larger blocks" : ""),
+    countOf(step.samples, "sample"),
   ]);
 }
 
@@ -67,7 +67,7 @@ function floorTrace(cell, ends, theme) {
     line: { color: style.colour, dash: "dash", width: 1 },
     showlegend: false,
     hoverinfo: "text",
-    text: plotText(`floor of ${cell.label}: ${formatInterval(floor)}`),
+    text: plotText(`floor of ${cell.label}: ${formatInterval(floor, formatPercent)}`),
   };
 }
 
@@ -118,7 +118,7 @@ function convergenceCaption(scene, view) {
     const { x, y } = steps[steps.length - 1];
     return `${cell.label} ${formatNumber(y.value, 3)} at ${view.y === "rmse" && view === convergenceViews.time ? formatSeconds(x.value) : formatNumber(x.value, 3)}`;
   });
-  const floors = floorsOf(shown, view).map((cell) => `${cell.label} ${formatNumber(cell.cost.floor.value, 3)}`);
+  const floors = floorsOf(shown, view).map((cell) => `${cell.label} ${formatPercent(cell.cost.floor.value)}`);
   return [
     `With the most samples: ${listed(last)}.`,
     floors.length > 0 ? `Dashed floors, which no number of samples passes: ${listed(floors)}.` : "",
@@ -161,12 +161,12 @@ function buildError(body) {
 }
 
 function hasParetoPoint(cell) {
-  return hasCostAndTime(cell) && cell.time.ns_per_sample.value > 0 && !isExact(cell);
+  return hasCostAndTime(cell) && cell.time.ns_per_sample.value > 0 && !hasNoNoise(cell);
 }
 
 function hoverOfCost(cell) {
   return plotLines([
-    cell.label,
+    labelWithFloor(cell),
     `variance of a sample: ${formatInterval(cell.cost.variance)}`,
     `time of a sample: ${formatInterval(cell.time.ns_per_sample)} ns`,
     `variance × ns: ${formatInterval(cell.cost.variance_x_ns)}`,
@@ -179,7 +179,7 @@ function paretoTrace(cell, theme) {
   return {
     type: "scatter",
     mode: "markers",
-    name: plotText(cell.label),
+    name: plotText(labelWithFloor(cell)),
     x: [time.value],
     y: [cell.cost.variance.value],
     error_x: errorBars([time], style),
@@ -206,7 +206,7 @@ function frontTrace(cells, theme) {
 function paretoPlot(scene, width, theme) {
   const cells = cellsOf(scene).filter(hasParetoPoint);
   return {
-    traces: [frontTrace(cells, theme), ...cells.map((cell) => paretoTrace(cell, theme))].filter(({ x }) => x.length > 0),
+    traces: [frontTrace(cells, theme), ...cells.map((cell) => paretoTrace(cell, theme))].filter(({ mode, x }) => mode !== "lines" || x.length > 1),
     layout: {
       ...baseLayout(theme),
       height: width < 620 ? 360 + 20 * cells.length : 400,
@@ -219,19 +219,19 @@ function paretoPlot(scene, width, theme) {
 
 function paretoCaption(scene) {
   const cells = cellsOf(scene).filter(hasCostAndTime);
-  const front = cells.filter((cell) => cell.cost.pareto).map((cell) => cell.label);
-  const exact = cells.filter(isExact).map((cell) => `${cell.label} ${formatInterval(cell.time.ns_per_sample)} ns`);
+  const front = cells.filter((cell) => cell.cost.pareto).map(labelWithFloor);
+  const still = cells.filter(hasNoNoise).map((cell) => `${labelWithFloor(cell)} ${formatInterval(cell.time.ns_per_sample)} ns`);
   return [
     front.length > 0 ? `On the front: ${listed(front, 8)}.` : "",
-    exact.length > 0 ? `Without variance, so not on a logarithmic axis: ${listed(exact)}.` : "",
+    still.length > 0 ? `Without variance, so not on a logarithmic axis: ${listed(still)}.` : "",
   ].join(" ").trim();
 }
 
 function costNumbers(scene) {
   const rows = cellsOf(scene).filter(hasCostAndTime).map((cell) => [
     markedLabel(cell.label), formatInterval(cell.time.ns_per_sample), formatInterval(cell.cost.variance),
-    formatInterval(cell.cost.variance_x_ns), cell.cost.pareto ? "yes" : "no"]);
-  return plainTable(["estimator", "ns a sample", "variance of a sample", "variance × ns", "on the front"], rows);
+    formatInterval(cell.cost.variance_x_ns), cell.cost.pareto ? "yes" : "no", floorText(cell)]);
+  return plainTable(["estimator", "ns a sample", "variance of a sample", "variance × ns", "on the front", "floor of the error"], rows);
 }
 
 function paretoFigure(scene) {
@@ -251,8 +251,8 @@ function buildPareto(body) {
 const matrixViews = {
   variance_x_ns: { title: "variance × ns", of: (cell) => (cell.time ? cell.cost?.variance_x_ns : null) },
   variance_x_lookups: { title: "variance × lookups", of: (cell) => cell.cost?.variance_x_lookups },
-  seconds_1: { title: "seconds to 1 %", of: (cell) => secondsTo(cell, 0) },
-  seconds_01: { title: "seconds to .1 %", of: (cell) => secondsTo(cell, 1) },
+  seconds_1: { title: "seconds to\u00a01\u00a0%", of: (cell) => secondsTo(cell, 0) },
+  seconds_01: { title: "seconds to\u00a00.1\u00a0%", of: (cell) => secondsTo(cell, 1) },
 };
 
 /** A cost so many powers of ten above the best is not told from a higher one by its colour. */
@@ -261,7 +261,7 @@ const mostDecades = 4;
 /** With more scenes than fit side by side they become the rows. */
 const mostColumns = 24;
 
-/** Rows and columns that the filters leave something of, with each cell's cost relative to the best of its column. */
+/** Rows and columns that the filters leave something of, with each cell's cost relative to the best unbiased of its column. */
 function matrixOf(view) {
   const { rows, columns, cells } = report.matrix;
   const costAt = (row, column) => {
@@ -273,8 +273,11 @@ function matrixOf(view) {
   const known = (entry) => isNumber(entry?.cost?.value);
   const keptRows = rows.map((_, row) => row).filter((row) => grid[row].some(known));
   const keptColumns = columns.map((_, column) => column).filter((column) => keptRows.some((row) => known(grid[row][column])));
-  const best = keptColumns.map((column) =>
-    Math.min(...keptRows.map((row) => grid[row][column]).filter((entry) => known(entry) && !costsNothing(entry)).map(({ cost }) => cost.value)));
+  const best = keptColumns.map((column) => {
+    const rivals = keptRows.map((row) => grid[row][column]).filter((entry) => known(entry) && entry.cost.value !== 0);
+    const unbiased = rivals.filter(({ cell }) => claimsUnbiased(cell));
+    return Math.min(...(unbiased.length > 0 ? unbiased : rivals).map(({ cost }) => cost.value));
+  });
   return {
     labels: keptRows.map((row) => rows[row]),
     scenes: keptColumns.map((column) => report.scenes[columns[column].scene]),
@@ -282,41 +285,48 @@ function matrixOf(view) {
   };
 }
 
-/** Without variance, or without lookups where those are the cost. */
-function costsNothing({ cell, cost }) {
-  return cost.value === 0 || isExact(cell);
-}
-
 function relativeEntry(entry, best) {
   const value = entry?.cost?.value;
   if (!isNumber(value)) return { ...entry, relative: null };
-  const nothing = costsNothing(entry);
+  const nothing = value === 0;
   return { ...entry, relative: nothing ? null : value / best, nothing };
+}
+
+/** What stands in for a cost of nothing: samples without variance are exact, or wrong without noise. */
+function nothingText({ cell }) {
+  if (!hasNoNoise(cell)) return "0";
+  return isExact(cell) ? "exact" : `no noise, error ${floorText(cell)}`;
 }
 
 function matrixText(entry) {
   if (!entry.cell) return "";
-  if (entry.nothing) return isExact(entry.cell) ? "exact" : "0";
-  return entry.relative === null ? "" : formatNumber(entry.relative, entry.relative < 100 ? 2 : 3);
+  if (entry.nothing) return plotLines(nothingText(entry).split(/(?<=,) /));
+  if (entry.relative === null) return "";
+  const floor = floorText(entry.cell);
+  return plotLines([formatNumber(entry.relative, entry.relative < 100 ? 2 : 3), ...(floor ? [`floor ${floor}`] : [])]);
 }
 
 function hoverOfEntry(entry, view, label, scene) {
   if (!entry.cell) return plotLines([label, scene.name, "not measured"]);
-  const relative = entry.relative === null ? "" : `${formatNumber(entry.relative, 3)} times the best of the scene`;
-  return plotLines([label, scene.name, `${view.title}: ${formatInterval(entry.cost)}`, entry.nothing && isExact(entry.cell) ? "exact but for rounding" : relative]);
+  const relative = entry.relative === null ? "" : `${formatNumber(entry.relative, 3)} times the best unbiased of the scene`;
+  const floor = floorText(entry.cell);
+  return plotLines([
+    label, scene.name, `${view.title}: ${formatInterval(entry.cost)}`, entry.nothing ? nothingText(entry) : relative,
+    ...(floor ? [`floor of the error ${floor}`] : [])]);
 }
 
 function decades(most) {
   return Array.from({ length: Math.floor(most) + 1 }, (_, exponent) => exponent);
 }
 
-function matrixAnnotations(texts, shades, most) {
+function matrixAnnotations(texts, shades, most, theme) {
+  const ink = (shade) => (shade === null ? theme.ink : shade > 0.55 * most ? "#000000" : "#ffffff");
   return texts.flatMap((line, row) => line.map((text, column) => ({
     x: column,
     y: texts.length - 1 - row,
     text,
     showarrow: false,
-    font: { size: 10, color: shades[row][column] > 0.55 * most ? "#000000" : "#ffffff" },
+    font: { size: 10, color: ink(shades[row][column]) },
   }))).filter(({ text }) => text !== "");
 }
 
@@ -325,7 +335,7 @@ function transposed(grid) {
 }
 
 function shadeOf(entry) {
-  if (entry.nothing) return 0;
+  if (entry.nothing) return floorText(entry.cell) ? null : 0;
   return entry.relative === null ? null : Math.log10(entry.relative);
 }
 
@@ -334,7 +344,8 @@ function matrixPlot({ labels, scenes, entries }, view, theme) {
   const names = scenes.map((scene) => scene.short);
   const scenesDown = scenes.length > mostColumns;
   const turned = (grid) => (scenesDown ? transposed(grid) : grid);
-  const [down, across] = scenesDown ? [names, labels] : [labels, names];
+  const marked = labels.map((label, row) => (entries[row].some(({ cell }) => cell && floorText(cell)) ? `${label} (biased)` : label));
+  const [down, across] = scenesDown ? [names, marked] : [marked, names];
   const shades = turned(entries.map((line) => line.map(shadeOf)));
   const most = Math.min(mostDecades, Math.max(1, ...shades.flat()));
   const upwards = (rows) => [...rows].reverse();
@@ -352,7 +363,7 @@ function matrixPlot({ labels, scenes, entries }, view, theme) {
       hoverinfo: "text",
       text: upwards(turned(hover)),
       colorbar: {
-        title: { text: "times the best", side: "right" },
+        title: { text: "times the best unbiased", side: "right" },
         tickvals: decades(most),
         ticktext: decades(most).map((exponent) => (exponent < mostDecades ? String(10 ** exponent) : `10<sup>${exponent}</sup> or more`)),
         thickness: 12,
@@ -365,7 +376,7 @@ function matrixPlot({ labels, scenes, entries }, view, theme) {
       ...baseLayout(theme),
       height: 80 + rowHeight * down.length + (angle === 0 ? 0 : 150),
       plot_bgcolor: "rgba(128,128,128,.22)",
-      annotations: across.length <= 16 && rowHeight > 14 ? matrixAnnotations(turned(entries.map((line) => line.map(matrixText))), shades, most) : [],
+      annotations: across.length <= 16 && rowHeight > 14 ? matrixAnnotations(turned(entries.map((line) => line.map(matrixText))), shades, most, theme) : [],
       xaxis: matrixAxis(theme, across, angle, 1),
       yaxis: matrixAxis(theme, upwards(down), 0, Math.ceil(13 / rowHeight)),
     },
@@ -386,9 +397,9 @@ function matrixAxis(theme, names, angle, every) {
 }
 
 function matrixCaption({ labels, scenes, entries }) {
-  const best = labels.map((label, row) => [label, entries[row].filter(({ relative }) => relative === 1).length]).sort((a, b) => b[1] - a[1]);
+  const best = labels.map((label, row) => [label, entries[row].filter(({ relative, cell }) => relative === 1 && claimsUnbiased(cell)).length]).sort((a, b) => b[1] - a[1]);
   const named = best.filter(([, count]) => count > 0).map(([label, count]) => `${label} ${count}`);
-  return `${countOf(labels.length, "estimator")} on ${countOf(scenes.length, "scene")}. Best of its column, and how often: ${listed(named)}.`;
+  return `${countOf(labels.length, "estimator")} on ${countOf(scenes.length, "scene")}. Best unbiased of its column, and how often: ${listed(named) || "none"}.`;
 }
 
 function matrixNumbers({ labels, scenes, entries }) {
@@ -399,7 +410,7 @@ function matrixNumbers({ labels, scenes, entries }) {
 function matrixFigure(view) {
   const matrix = matrixOf(view);
   return {
-    title: `${view.title}, relative to the best of each scene`,
+    title: `${view.title}, relative to the best unbiased of each scene`,
     caption: matrixCaption(matrix),
     height: 130 + 26 * matrix.labels.length,
     describe: (_, theme) => matrixPlot(matrix, view, theme),

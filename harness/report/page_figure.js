@@ -58,10 +58,23 @@ function axis(theme, title, more = {}) {
   };
 }
 
-/** Ticks at powers of ten, or at 1, 2, 5 where the values span too few of those. */
+/** Round numbers from low to high, at least three of them. */
+function roundTicks(low, high) {
+  const rough = (high - low) / 4;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * [5, 2, 1].find((factor) => factor * power <= rough);
+  const ticks = [];
+  for (let k = Math.ceil(low / step); k * step <= high; ++k) ticks.push(Number((k * step).toPrecision(12)));
+  return ticks;
+}
+
+/** Ticks at powers of ten, at 1, 2, 5 where the values span too few of those, at round numbers where too few of these. */
 function logAxis(theme, title, values) {
-  const decades = Math.log10(Math.max(...values) / Math.min(...values));
-  return axis(theme, title, { type: "log", exponentformat: "power", minexponent: 2, dtick: decades > 1.7 ? Math.ceil(decades / 8) : "D2" });
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const span = Math.log10(high / low);
+  const format = { type: "log", exponentformat: "power", minexponent: 2 };
+  if (span > 0 && span < 0.75) return axis(theme, title, { ...format, tickmode: "array", tickvals: roundTicks(low, high), ticktext: roundTicks(low, high).map((x) => formatNumber(x, 3)) });
+  return axis(theme, title, { ...format, dtick: span > 2 || span === 0 ? Math.max(1, Math.ceil(span / 8)) : "D2" });
 }
 
 /** Names go beside a wide plot and below a narrow one. */

@@ -5,14 +5,13 @@ const paperWidth = 900;
 const mostScenes = 12;
 const mostPictures = 8;
 
-function slugs() {
-  const taken = new Set();
+/** "pareto-profiles-2": what is drawn, the experiment, and which of its plots of that kind. */
+function numberedNames() {
+  const counts = new Map();
   return (text) => {
-    const base = text.toLowerCase().replace(/[^a-z0-9]+/g, "-").slice(0, 60).replace(/^-|-$/g, "") || "scene";
-    let slug = base;
-    for (let number = 2; taken.has(slug); ++number) slug = `${base}-${number}`;
-    taken.add(slug);
-    return slug;
+    const base = text.toLowerCase().replace(/[^a-z0-9]+/g, "-").slice(0, 60).replace(/^-|-$/g, "");
+    counts.set(base, (counts.get(base) ?? 0) + 1);
+    return `${base}-${counts.get(base)}`;
   };
 }
 
@@ -24,7 +23,7 @@ function convergencePaper() {
   const view = usefulConvergenceViews()[0]?.[1] ?? convergenceViews.time;
   const name = view === convergenceViews.time ? "error-over-time" : "error-over-lookups";
   const scenes = firstScenes((cell) => stepsOf(cell, view).length > 0);
-  return scenes.map((scene) => ({ name: `${name} ${scene.short}`, describe: convergenceFigure(scene, view).describe }));
+  return scenes.map((scene) => ({ name: `${name} ${scene.experiment}`, describe: convergenceFigure(scene, view).describe }));
 }
 
 function picturesPaper(scene, kind, tilesOf, columns) {
@@ -32,12 +31,12 @@ function picturesPaper(scene, kind, tilesOf, columns) {
   const figures = (cell) => `, RMSE ${cell.rmse.map((x) => formatNumber(x, 3)).join(", ")}`;
   const named = (cell) => (picture) => [shortened(cell.label, 30), picture.title + (picture === imageKinds.mean ? figures(cell) : "")];
   const tiles = () => cells.flatMap((cell) => tilesOf(cell, cells, named(cell)));
-  return { name: `${kind} ${scene.short}`, describe: (width, theme) => picturesPlot(tiles(), columns(cells[0]), width, theme) };
+  return { name: `${kind} ${scene.experiment}`, describe: (width, theme) => picturesPlot(tiles(), columns(cells[0]), width, theme) };
 }
 
 function scalingPaper() {
   const view = usefulScalingViews()[0]?.[1] ?? scalingViews.ns_per_sample;
-  return scalingGroups(view).map((group) => ({ name: `scaling ${group.axis} ${group.rest}`, describe: scalingFigure(group, view).describe }));
+  return scalingGroups(view).map((group) => ({ name: `scaling ${report.cells[group.series[0].points[0].cell].experiment}`, describe: scalingFigure(group, view).describe }));
 }
 
 function paperFigures() {
@@ -46,7 +45,7 @@ function paperFigures() {
   const matrix = usefulMatrixViews().slice(0, 1).map(([, view]) => ({ name: "matrix", describe: matrixFigure(view).describe }));
   return [
     ...convergencePaper(),
-    ...firstScenes(hasParetoPoint).map((scene) => ({ name: `pareto ${scene.short}`, describe: paretoFigure(scene).describe })),
+    ...firstScenes(hasParetoPoint).map((scene) => ({ name: `pareto ${scene.experiment}`, describe: paretoFigure(scene).describe })),
     ...matrix,
     ...withImages.map((scene) => picturesPaper(scene, "maps", maps, (cell) => maps(cell, [cell], titleLine).length)),
     ...withImages.map((scene) => picturesPaper(scene, "strips", stripTiles, (cell) => stripTiles(cell, [cell], titleLine).length)),
@@ -64,9 +63,9 @@ async function drawnForPaper({ describe }, name) {
 }
 
 async function writeFigures() {
-  const slug = slugs();
+  const nameOf = numberedNames();
   const drawn = [];
-  for (const figure of paperFigures()) drawn.push(await drawnForPaper(figure, slug(figure.name)));
+  for (const figure of paperFigures()) drawn.push(await drawnForPaper(figure, nameOf(figure.name)));
   const place = document.createElement("script");
   place.setAttribute("type", "application/json");
   place.setAttribute("id", "figures");

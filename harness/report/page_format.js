@@ -32,6 +32,16 @@ function formatInterval(interval, format = (x) => formatNumber(x, 3)) {
   return `${format(interval.value)} ${formatEnds(interval, format)}`;
 }
 
+/** "22 %"; the space does not break. */
+function formatPercent(share, digits = 2) {
+  return `${formatNumber(100 * share, digits)}\u00a0%`;
+}
+
+/** Numbers in a configuration's words as the page writes its own: "-.95" becomes "−0.95". */
+function withPageNumbers(text) {
+  return text.replace(/(^|[^\d.])\.(?=\d)/g, "$10.").replace(/(^|[\s(=])-(?=\d)/g, "$1−");
+}
+
 function formatSeconds(x) {
   if (!isNumber(x)) return unknown;
   const units = [[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"]];
@@ -44,13 +54,15 @@ function shortMedium(label) {
   return label.replace(/(?:vdb\/)?file:[^|]*?([^/|]+\.n?vdb)/, "$1");
 }
 
-/** Names of scenes without the parts that all of them share. */
-function shortSceneNames(scenes) {
+/** Names of scenes, which begin with their experiments, without the parts that all of them share. */
+function shortSceneNames(scenes, experiments) {
   const parts = scenes.map((scene) => scene.name.split(" | "));
   const differs = (place) => parts.some((name) => name[place] !== parts[0][place]);
-  return parts.map((name) => {
+  const several = new Set(experiments).size > 1;
+  return parts.map((name, scene) => {
     const own = name.filter((_, place) => differs(place)).map(shortMedium);
-    return own.length > 0 ? own.join(" · ") : shortMedium(name.join(" · "));
+    const rest = own.length > 0 ? own.join(" · ") : shortMedium(name.join(" · "));
+    return several ? `${experiments[scene]}: ${rest}` : rest;
   });
 }
 

@@ -238,12 +238,15 @@ function tileBar(tile, place, theme) {
   };
 }
 
+/** Pixels without a value on their scale: not finite, or zero on a logarithmic one. */
+const noValueGrey = "#9a9a9a";
+
 function picturesPlot(tiles, columns, width, theme) {
   const { image } = tiles[0];
   const across = width < 620 ? Math.min(2, columns) : columns;
   const headings = 4 + 14 * tiles[0].heading.length;
   const { places, height } = tilePlaces(tiles.length, across, width, image.height / image.width, headings);
-  const layout = { ...baseLayout(theme), height, margin: { l: 1, r: 0, t: 0, b: 0 }, annotations: [] };
+  const layout = { ...baseLayout(theme), height, margin: { l: 1, r: 0, t: 0, b: 0 }, annotations: [], plot_bgcolor: noValueGrey };
   const traces = tiles.map((tile, i) => {
     const suffix = i === 0 ? "" : String(i + 1);
     layout[`xaxis${suffix}`] = pictureAxis(theme, places[i].x, `y${suffix}`);
@@ -290,9 +293,10 @@ function tileNumbers(tiles) {
 }
 
 function picturesFigure(scene, cell, tiles) {
+  const zeros = tiles().filter(({ logarithmic, image }) => logarithmic && image.low <= 0).map(({ kind }) => kind.title);
   return {
     title: `${cell.label}: ${scene.short}`,
-    caption: imageCaption(cell),
+    caption: imageCaption(cell) + (zeros.length > 0 ? ` Grey: zero, which a logarithmic scale has not (${listed(zeros)}).` : ""),
     height: 230,
     describe: (width, theme) => picturesPlot(tiles(), tiles().length, width, theme),
     numbers: () => tileNumbers(tiles()),

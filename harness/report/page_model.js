@@ -16,9 +16,10 @@ const fewScenes = 4;
 
 function nameThings() {
   report.cells.forEach((cell, index) => Object.assign(cell, { index, label: cell.estimator }));
-  const names = shortSceneNames(report.scenes);
+  const experiments = report.scenes.map(({ ranking }) => [...new Set(ranking.map(({ cell }) => report.cells[cell].experiment))].sort().join(" + "));
+  const names = shortSceneNames(report.scenes, experiments);
   report.scenes.forEach((scene, index) => {
-    Object.assign(scene, { index, short: names[index] });
+    Object.assign(scene, { index, short: names[index], experiment: experiments[index] });
     for (const entry of scene.ranking) report.cells[entry.cell].label = entry.label;
   });
 }
@@ -52,9 +53,37 @@ function hasCostAndTime(cell) {
 /** Errors below are rounding; a scale that shows them shows nothing else. */
 const rounding = 1e-10;
 
-function isExact(cell) {
-  return cell.cost.variance.value <= (rounding * cell.cost.reference) ** 2;
+/** A tracker's samples may all be equal and all be wrong. */
+function hasNoNoise(cell) {
+  return cell.cost.variance.value === 0;
 }
+
+function isExact(cell) {
+  return hasNoNoise(cell) && (cell.cost.floor === null || cell.cost.floor.high === 0);
+}
+
+function measurementOf(cell) {
+  return cell.scene === null ? "" : report.scenes[cell.scene].measurement;
+}
+
+/** Samples that are clamped or rounded are biased whatever their tracker is. */
+function claimsUnbiased(cell) {
+  return ["unbiased", "exact"].includes(cell.claims) && measurementOf(cell) === "";
+}
+
+/** The error that no number of samples removes, as far as noise lets it be seen; empty where there is none. */
+function floorText(cell) {
+  const floor = cell.cost?.floor;
+  if (!floor || floor.high === 0) return "";
+  return floor.low > 0 ? formatPercent(floor.value) : `< ${formatPercent(floor.high)}`;
+}
+
+function labelWithFloor(cell) {
+  const floor = floorText(cell);
+  return floor ? `${cell.label}, floor ${floor}` : cell.label;
+}
+
+const anythingTimed = report.cells.some((cell) => isNumber(cell.time?.ns_per_sample?.value));
 
 function hasImages(cell) {
   return cell.images !== null;

@@ -2,9 +2,28 @@
 
 const outcomeMarks = { PASS: "✓", FAIL: "✗", VIOLATED: "!", INCONCLUSIVE: "?", "INCONCLUSIVE as planned": "?" };
 
-function outcomeBadge(text, word = text) {
+function outcomeBadge(text, word = text, more = {}) {
   const kind = word.split(" ")[0].toLowerCase();
-  return element("span", { className: `badge ${kind}` }, `${outcomeMarks[word] ?? "·"} ${text}`);
+  return element(more.href ? "a" : "span", { className: `badge ${kind}`, ...more }, `${outcomeMarks[word] ?? "·"} ${text}`);
+}
+
+const outcomeMeanings = {
+  PASS: "a bias above epsilon is ruled out",
+  FAIL: "bias is proven, or lookups or walks break a law",
+  INCONCLUSIVE: "neither bias nor its absence is proven, though the plan foresaw a decision",
+  "INCONCLUSIVE as planned": "the plan said beforehand that no affordable number of samples decides",
+  "nothing claimed": "the estimator claims nothing here, or the configuration disables the verdict",
+};
+
+function violationsText() {
+  const cells = report.cells.filter((cell) => outcomeOf(cell) === "VIOLATED");
+  const lookups = cells.reduce((sum, cell) => sum + cell.violations, 0);
+  const largest = Math.max(...cells.map((cell) => cell.largest_violation ?? 1));
+  return `needs a majorant that bounds the extinction: ${countOf(lookups, "lookup")} above the bound, largest ratio ${formatNumber(largest, 3)}`;
+}
+
+function outcomeMeaning(word) {
+  return word === "VIOLATED" ? violationsText() : outcomeMeanings[word] ?? "see the reasons in the table of every cell";
 }
 
 const verdictWords = [
@@ -14,7 +33,8 @@ const verdictWords = [
 
 function verdictTotals() {
   const counts = verdictWords.map(([key, word]) => [word, report.runs.reduce((sum, run) => sum + run.verdicts[key], 0)]);
-  const badges = counts.filter(([, count]) => count > 0).map(([word, count]) => outcomeBadge(`${count} ${word}`, word));
+  const badges = counts.filter(([, count]) => count > 0).map(([word, count]) =>
+    outcomeBadge(`${count} ${word}`, word, { href: "#verdicts", title: outcomeMeaning(word), onclick: () => chooseOutcome(word) }));
   return element("p", { className: "totals" }, ...badges);
 }
 
@@ -22,34 +42,63 @@ function winnersOf(scene) {
   return scene.ranking.filter((entry) => entry.rank === 1 && passes(report.cells[entry.cell]));
 }
 
+/** The fastest of those that claim to be unbiased, with whom it is tied. */
+function unbiasedWinnersOf(scene) {
+  const entries = scene.ranking.filter((entry) => entry.rank !== null && passes(report.cells[entry.cell]) && claimsUnbiased(report.cells[entry.cell]));
+  const best = Math.min(...entries.map(({ rank }) => rank));
+  return entries.filter(({ rank }) => rank === best);
+}
+
 function claimTag(cell) {
   return cell.claims === "unbiased" || cell.claims === "exact" ? null : element("span", { className: "tag" }, cell.claims);
 }
 
+function namesAndSeconds(entries) {
+  const names = entries.flatMap((entry, i) => [i > 0 ? " = " : "", markedLabel(entry.label), claimTag(report.cells[entry.cell]) ?? ""]);
+  const seconds = entries.map((entry) => formatSeconds(secondsTo(report.cells[entry.cell], 0)?.value));
+  return [element("span", {}, ...names), seconds.join(" = ")];
+}
+
 function winnerRow(scene) {
-  const names = winnersOf(scene).flatMap((entry, i) => [i > 0 ? " = " : "", markedLabel(entry.label), claimTag(report.cells[entry.cell]) ?? ""]);
-  const seconds = winnersOf(scene).map((entry) => formatSeconds(secondsTo(report.cells[entry.cell], 0)?.value));
-  return [scene.short, element("span", {}, ...names), seconds.join(" = ")];
+  return [scene.short, ...namesAndSeconds(winnersOf(scene)), ...namesAndSeconds(unbiasedWinnersOf(scene))];
+}
+
+function tally(scenes, winners) {
+  const wins = new Map();
+  for (const scene of scenes) for (const { label } of winners(scene)) wins.set(label, (wins.get(label) ?? 0) + 1);
+  return listed([...wins].sort((a, b) => b[1] - a[1]).map(([label, count]) => `${label} in ${countOf(count, "scene")}`), 2);
 }
 
 function winnersSentence(scenes) {
-  const wins = new Map();
-  for (const scene of scenes) for (const { label } of winnersOf(scene)) wins.set(label, (wins.get(label) ?? 0) + 1);
-  const best = [...wins].sort((a, b) => b[1] - a[1]).map(([label, count]) => `${label} ${count}`);
-  return `Fastest to 1 % error, alone or tied, in ${countOf(scenes.length, "scene")}: ${listed(best, 2)}`;
+  const unbiased = tally(scenes, unbiasedWinnersOf);
+  const best = unbiased ? `; best unbiased: ${unbiased}` : "";
+  return `Fastest to 1\u00a0% error, alone or tied, of ${countOf(scenes.length, "scene")}: ${tally(scenes, winnersOf)}${best}`;
+}
+
+function versionsText() {
+  const measured = [...new Set(report.runs.map(({ version }) => version))];
+  return `Measured by ${listed(measured)}; page by ${report.version}`;
+}
+
+/** What a reader must know of the results before trusting or missing something. */
+function remarkLines() {
+  const lines = report.runs.flatMap((run) => run.remarks.map((remark) => `${run.file}: ${remark}`));
+  if (!anythingTimed) lines.push("Nothing was timed (--no-timing, or the configuration disables it), so columns and plots of time are left out.");
+  return lines.map((line) => element("p", { className: "remark" }, line));
 }
 
 function buildSummary(body) {
   const winners = details("");
   const runs = report.runs.map((run) => run.file).join(", ");
-  body.append(element("p", { className: "about" }, `${countOf(report.cells.length, "cell")} of ${runs}. ${report.version}`), verdictTotals(), winners);
+  body.append(
+    element("p", { className: "about" }, `${countOf(report.cells.length, "cell")} of ${runs}. ${versionsText()}`), ...remarkLines(), verdictTotals(), winners);
   if (report.tables.length === 0 && report.scenes.length <= 12) winners.open = true;
   if (report.credits.length > 0) winners.after(details("Volumes shown and their makers", element("ul", {}, ...report.credits.map((line) => element("li", {}, line)))));
   return () => {
     const scenes = report.scenes.filter((scene) => winnersOf(scene).length > 0);
     winners.hidden = scenes.length === 0;
     winners.replaceChildren(
-      element("summary", {}, winnersSentence(scenes)), plainTable(["scene", "fastest to 1 % (= tied)", "seconds a ray"], scenes.map(winnerRow)));
+      element("summary", {}, winnersSentence(scenes)), plainTable(["scene", "fastest to 1\u00a0% (= tied)", "seconds a ray", "fastest unbiased", "seconds a ray"], scenes.map(winnerRow)));
   };
 }
 
@@ -73,10 +122,6 @@ function thumbnailRanges(cells) {
     const light = kind.colours === greys && shown.some(imageKinds.reference.of);
     return [kind, light ? lightRange(shown) : sharedRange(kind, shown)];
   }));
-}
-
-function measurementOf(cell) {
-  return cell.scene === null ? "" : report.scenes[cell.scene].measurement;
 }
 
 function measurementsOf(table, column) {
@@ -122,13 +167,13 @@ function referenceCell(row, ranges) {
 }
 
 function rowOfTable(table, row, index, pictured, ranges) {
-  const note = row.note ? element("small", { className: "note" }, row.note) : null;
+  const note = row.note ? element("small", { className: "note" }, withPageNumbers(row.note)) : null;
   const hasPictures = pictured.some((column) => row.cells[column] !== null && hasImages(report.cells[row.cells[column]]));
   const pictures = hasPictures
     ? [referenceCell(row, ranges), ...pictured.map((column) => pictureCell(row.cells[column], ranges))]
     : pictured.length > 0 ? [element("td", { colSpan: 1 + pictured.length }, note ?? "")] : [];
   const cells = [
-    element("th", { scope: "row" }, row.label, hasPictures || pictured.length === 0 ? note : null),
+    element("th", { scope: "row" }, withPageNumbers(row.label), hasPictures || pictured.length === 0 ? note : null),
     ...table.columns.map((_, column) => tableValue(row, column)),
     ...pictures,
   ];
@@ -155,7 +200,7 @@ function tableKeys(ranges) {
 function buildTables(body) {
   report.tables.forEach((table, index) => {
     const { made, ranges } = tableFigure(table, index);
-    body.append(element("h3", {}, table.title), made, tableKeys(ranges) ?? "");
+    body.append(element("h3", {}, withPageNumbers(table.title)), made, tableKeys(ranges) ?? "");
   });
   return () => {};
 }
@@ -164,51 +209,77 @@ function buildTables(body) {
 
 function rankText(entry) {
   if (entry.rank === null) return unknown;
-  return entry.tied ? `=${entry.rank}` : String(entry.rank);
+  return entry.tied ? `${entry.rank}=` : String(entry.rank);
 }
 
 function reachedText(cell, place) {
   const target = secondsTo(cell, place);
   if (!target || !cell.time?.ns_per_sample) return unknown;
-  return target.reached ? intervalText(target, formatSeconds) : "never";
+  if (!target.reached) return "never";
+  const text = intervalText(target, formatSeconds);
+  return target.amortised ? element("span", {}, "~", text) : text;
 }
 
 function breakEvenText(scene, place) {
   const entry = scene.break_even.find(({ cell }) => cell === place);
   if (!entry) return "";
   if (entry.kind !== "at") return entry.kind;
-  return `cheaper above an error of ${formatNumber(entry.error?.value, 2)} (${formatSeconds(entry.seconds?.value)})`;
+  return `cheaper above an error of ${formatPercent(entry.error?.value)} (${formatSeconds(entry.seconds?.value)})`;
 }
 
+function estimatorCell(scene, entry, cell) {
+  const baseline = entry.cell === scene.baseline ? element("span", { className: "tag" }, "baseline") : "";
+  return element("span", {}, markedLabel(entry.label), baseline, claimTag(cell) ?? "");
+}
+
+/** Columns of a ranking; those of times are left out where nothing was timed. */
+const rankingColumns = [
+  { title: "rank", timed: true, of: (_, entry) => rankText(entry) },
+  { title: "estimator", of: estimatorCell },
+  { title: "cost relative to baseline", timed: true, of: (_, entry) => intervalText(entry.relative) },
+  { title: "seconds to\u00a01\u00a0%", timed: true, of: (_, __, cell) => reachedText(cell, 0) },
+  { title: "seconds to\u00a00.1\u00a0%", timed: true, of: (_, __, cell) => reachedText(cell, 1) },
+  { title: "variance", of: (_, __, cell) => intervalText(cell.cost?.variance) },
+  { title: "variance × ns", timed: true, of: (_, __, cell) => intervalText(cell.cost?.variance_x_ns) },
+  { title: "variance × lookups", of: (_, __, cell) => intervalText(cell.cost?.variance_x_lookups) },
+  { title: "floor of the error", of: (_, __, cell) => (floorText(cell) ? intervalText(cell.cost.floor, formatPercent) : "") },
+  { title: "against the best unbiased", timed: true, of: (scene, entry) => breakEvenText(scene, entry.cell) },
+].filter(({ timed }) => anythingTimed || !timed);
+
 function rankingRow(scene, entry) {
-  const cell = report.cells[entry.cell];
-  const { cost } = cell;
-  const row = tableRow([
-    rankText(entry),
-    element("span", {}, markedLabel(entry.label), entry.cell === scene.baseline ? element("span", { className: "tag" }, "baseline") : "", claimTag(cell) ?? ""),
-    intervalText(entry.relative), reachedText(cell, 0), reachedText(cell, 1), intervalText(cost?.variance),
-    intervalText(cost?.variance_x_ns), intervalText(cost?.variance_x_lookups), cost?.floor ? intervalText(cost.floor) : "",
-    breakEvenText(scene, entry.cell)]);
+  const row = tableRow(rankingColumns.map(({ of }) => of(scene, entry, report.cells[entry.cell])));
   row.dataset.ranked = String(entry.cell);
   return row;
 }
 
-const rankingHeadings = [
-  "rank", "estimator", "cost relative to baseline", "seconds to 1 %", "seconds to .1 %", "variance", "variance × ns", "variance × lookups", "floor of the error",
-  "against the best unbiased"];
+function amortisedNote(entries) {
+  const some = entries.some((entry) => report.cells[entry.cell].cost?.seconds.some(({ amortised }) => amortised));
+  return some ? element("p", { className: "says" }, "~ fewer samples are needed than shared a walk through the majorant structure when they were timed.") : "";
+}
 
+function unpairedText(scene) {
+  const reasons = report.unpaired.filter((one) => one.scene === scene.index && passes(report.cells[one.cell]));
+  return reasons.length === 0 ? "" : `Not paired: ${reasons.map((one) => `${report.cells[one.cell].label} ${one.reason}`).join("; ")}.`;
+}
+
+/** The error of one sample does not tell of a floor; that of the run's means does, and stands beside it. */
 function pairedTable(scene) {
   const pairs = report.paired.filter((pair) => pair.scene === scene.index && passes(report.cells[pair.cell]) && passes(report.cells[pair.against]));
-  if (pairs.length === 0) return null;
+  const missing = unpairedText(scene);
+  if (pairs.length === 0 && missing === "") return null;
+  const floors = pairs.some((pair) => pair.of_the_means);
+  const headings = ["estimator", "against", "ratio for 1 sample, same streams", "interval if streams were independent",
+    ...(floors ? [`ratio for ${pairs[0].samples} samples, bias included`] : [])];
   const rows = pairs.map((pair) => [
-    markedLabel(report.cells[pair.cell].label), markedLabel(report.cells[pair.against].label), formatInterval(pair.ratio), formatInterval(pair.unpaired)]);
-  return details("Mean squared errors on common random streams", plainTable(["estimator", "against", "ratio, paired", "ratio, not paired"], rows));
+    markedLabel(report.cells[pair.cell].label), markedLabel(report.cells[pair.against].label), formatInterval(pair.ratio),
+    formatEnds(pair.unpaired, (x) => formatNumber(x, 3)), ...(floors ? [pair.of_the_means ? formatInterval(pair.of_the_means) : ""] : [])]);
+  return details("Mean squared errors on common random streams", pairs.length > 0 ? plainTable(headings, rows) : "", element("p", { className: "says" }, missing));
 }
 
 function showRanking(panel, scene) {
   const entries = scene.ranking.filter((entry) => passes(report.cells[entry.cell]));
-  const table = element("table", { className: "ranking" }, headRow(rankingHeadings), element("tbody", {}, ...entries.map((entry) => rankingRow(scene, entry))));
-  panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), pairedTable(scene) ?? ""));
+  const table = element("table", { className: "ranking" }, headRow(rankingColumns.map(({ title }) => title)), element("tbody", {}, ...entries.map((entry) => rankingRow(scene, entry))));
+  panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), amortisedNote(entries), pairedTable(scene) ?? ""));
 }
 
 function buildRanking(body) {
@@ -239,8 +310,6 @@ function textOf(of, title = of) {
 function verdictReason(cell) {
   const parts = [cell.reason, cell.verdict?.reason];
   if (cell.verdict?.against === "own mean") parts.push("judged against its own mean");
-  if (cell.verdict?.lookups === "FAIL") parts.push("lookups differ from their expectation");
-  if (cell.verdict?.laws === "FAIL") parts.push("a law of its walks is broken");
   return parts.filter(Boolean).join("; ");
 }
 
@@ -253,7 +322,7 @@ const firstOf = (key) => (cell) => cell[key][0] ?? null;
 
 /** Columns of the table of every cell: how they are shown, and by what they are sorted. */
 const cellColumns = [
-  { title: "verdict", show: (cell) => element("td", {}, outcomeBadge(outcomeOf(cell))), sort: outcomeOf },
+  { title: "verdict", show: (cell) => element("td", {}, outcomeBadge(outcomeOf(cell), outcomeOf(cell), { title: verdictReason(cell) })), sort: outcomeOf },
   { title: "estimator", show: (cell) => element("td", {}, markedLabel(cell.label)), sort: (cell) => cell.label },
   { title: "medium", show: textOf((cell) => shortMedium(cell.medium), (cell) => cell.medium), sort: (cell) => cell.medium },
   { title: "majorant", show: textOf((cell) => cell.majorant), sort: (cell) => cell.majorant },
@@ -264,7 +333,7 @@ const cellColumns = [
   { title: "RMSE", show: perOutput("rmse"), sort: firstOf("rmse") },
   { title: "variance", show: perOutput("variance"), sort: firstOf("variance") },
   { title: "lookups", show: single("lookups", (cell) => cell.lookups), sort: (cell) => cell.lookups },
-  { title: "ns a sample", show: single("ns_per_sample", nanosecondsOf), sort: nanosecondsOf },
+  ...(anythingTimed ? [{ title: "ns a sample", show: single("ns_per_sample", nanosecondsOf), sort: nanosecondsOf }] : []),
   { title: "samples a ray", show: single("samples", (cell) => cell.verdict?.samples_per_ray ?? cell.samples_per_ray), sort: (cell) => cell.samples_per_ray },
   { title: "rays, light", show: textOf(sceneOfCell), sort: sceneOfCell },
   { title: "why", show: textOf(verdictReason), sort: verdictReason },
@@ -316,6 +385,9 @@ function sortedWord(column) {
   return cellTable.descending ? "descending" : "ascending";
 }
 
+/** Has the table of every cell show those of an outcome; set once the table is there. */
+let chooseOutcome = () => {};
+
 function cellTableControls(update) {
   const change = (key) => (value) => {
     cellTable[key] = value;
@@ -324,6 +396,10 @@ function cellTableControls(update) {
   };
   const outcomes = [...new Set(report.cells.map(outcomeOf))].sort();
   const choice = selectOf("Verdict", [["", "all"], ...outcomes.map((word) => [word, word])], change("outcome"));
+  chooseOutcome = (word) => {
+    choice.select.value = outcomes.includes(word) ? word : "";
+    change("outcome")(choice.select.value);
+  };
   const search = element("input", { type: "search", id: "search", oninput: () => change("words")(search.value) });
   return element("div", { className: "controls" }, choice.label, element("label", { className: "choice" }, "Words in the name ", search));
 }

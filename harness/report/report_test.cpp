@@ -54,6 +54,16 @@ TEST(Report, TellsOfCellsThatDidNotRun) {
   EXPECT_EQ(data["runs"][0]["verdicts"]["not_run"], 1);
 }
 
+TEST(Report, TellsWhichVersionMeasuredAndWhichShows) {
+  RunRecord run = example_results();
+  run.provenance["version"] = "\"0.0.1\"";
+  const ReportData data = report_data({run}, {"example.json"}, "", "");
+  EXPECT_EQ(data.json["runs"][0]["version"], "0.0.1");
+  EXPECT_NE(data.json["version"], "0.0.1");
+  ASSERT_EQ(data.warnings.size(), 1u);
+  EXPECT_NE(data.warnings[0].find("measured by 0.0.1, read by"), std::string::npos);
+}
+
 TEST(Report, NothingIsNeverWrittenAsANumber) {
   RunRecord run = example_results();
   run.cells[0].channel[0].mean = std::numeric_limits<Real>::quiet_NaN();
@@ -130,6 +140,14 @@ TEST_F(ReportImage, PicturesAreThoseOfTheRun) {
   data = report_data({run}, {file}, "", "");
   EXPECT_EQ(data.warnings.size(), 1u);
   EXPECT_TRUE(data.json["cells"][0]["images"].is_null());
+
+  run.cells[0].images["layers"] = "r.images/a.exr";
+  run.provenance["command_line"] = R"(["nullmark","run","c.json"])";
+  data = report_data({run}, {file}, "", "");
+  ASSERT_EQ(data.warnings.size(), 1u);
+  const std::string remedy = "keep r.images beside r.json, or make both again: nullmark run c.json";
+  EXPECT_NE(data.warnings[0].find(remedy), std::string::npos) << data.warnings[0];
+  EXPECT_NE(data.json["runs"][0]["remarks"].dump().find(remedy), std::string::npos);
 }
 
 TEST_F(ReportImage, LargePicturesAreAveragedDown) {

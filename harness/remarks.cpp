@@ -1,0 +1,36 @@
+#include "harness/remarks.h"
+
+#include <fmt/format.h>
+
+#include "harness/json_input.h"
+#include "harness/provenance.h"
+
+namespace nullmark {
+namespace {
+
+std::string short_version(const std::map<std::string, std::string>& provenance) {
+  const auto json = [&](const char* key) {
+    const auto at = provenance.find(key);
+    return at == provenance.end() ? Json() : Json::parse(at->second);
+  };
+  const Json version = json("version"), git = json("git");
+  if (!version.is_string()) return "an unknown version";
+  constexpr std::size_t kDigits = 7;
+  const bool known = git.is_object() && git.contains("commit") && git["commit"].is_string();
+  return known ? fmt::format("{} ({})", version.get<std::string>(), git["commit"].get<std::string>().substr(0, kDigits))
+               : version.get<std::string>();
+}
+
+}  // namespace
+
+std::string measured_by(const RunRecord& run) { return short_version(run.provenance); }
+
+std::string this_version() { return short_version(make_provenance({}, std::chrono::system_clock::now())); }
+
+std::optional<std::string> version_remark(const RunRecord& run) {
+  if (run.provenance.count("version") == 0 || measured_by(run) == this_version()) return std::nullopt;
+  return fmt::format("measured by {}, read by {}; run the configuration again where versions matter", measured_by(run),
+                     this_version());
+}
+
+}  // namespace nullmark
