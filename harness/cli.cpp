@@ -153,7 +153,8 @@ class CommandLine {
       if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
       warn(file_, version_remark(run));
       if (!markdown_.empty())
-        write_atomically(markdown_, summary_markdown(run, summary, file_) + (cases_ ? "\n" + stability_markdown(run) : ""));
+        write_atomically(markdown_, fmt::format("{}{}{}", summary_markdown(run, summary, file_), cases_ ? "\n" : "",
+                                                cases_ ? stability_markdown(run) : ""));
       if (cases_) fmt::print("{}\n", stability_text(run));
       fmt::print("{}", summary_text(run, summary));
       return summary.exit;

@@ -44,8 +44,8 @@ struct Case {
   std::string experiment, tracker;
   std::size_t cells = 0;
   std::uint64_t samples = 0, nonfinite = 0;
-  std::optional<Real> largest, relative_error, standard_errors, fewest_lookups, most_lookups;
-  Tally verdicts, guards;
+  std::optional<Real> largest{}, relative_error{}, standard_errors{}, fewest_lookups{}, most_lookups{};
+  Tally verdicts{}, guards{};
 
   void add(const CellRecord& record) {
     ++cells;
