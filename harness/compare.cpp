@@ -27,7 +27,7 @@ std::string shown(const std::optional<Interval>& x) { return x ? shown(*x) : "-"
 std::string time_shown(const Contender& contender, std::size_t target) {
   const std::optional<Interval>& seconds = contender.seconds[target];
   if (seconds && !std::isfinite(seconds->value)) return "never";
-  return (contender.amortised[target] ? "~" : "") + shown(seconds);
+  return fmt::format("{}{}", contender.amortised[target] ? "~" : "", shown(seconds));
 }
 
 std::string rank_shown(const Contender& contender) {
