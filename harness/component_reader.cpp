@@ -109,7 +109,7 @@ const std::vector<std::string> kMatterKeys = {"albedo", "anisotropy", "emission"
 void tell_of_extinction(const Place& place, const std::string& type, const std::vector<ParameterInfo>& parameters) {
   std::vector<std::string> names;
   for (const ParameterInfo& parameter : parameters)
-    if (parameter.unit == "1/length") names.push_back("\"" + parameter.name + "\"");
+    if (parameter.unit == "1/length") names.push_back(fmt::format("\"{}\"", parameter.name));
   if (!names.empty())
     place.fail(fmt::format("{} has no optical_depth; its extinction is set by {}", type, fmt::join(names, ", ")));
 }
