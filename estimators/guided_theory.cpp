@@ -52,7 +52,7 @@ RayProfile refined(const Rates& majorant, const RayProfile& profile, Real least)
 }  // namespace
 
 Theory guided_moments(const Rates& majorant, const RayProfile& profile, int c, Real least, bool start_looked_up) {
-  constexpr Real kDeepest = 32;
+  constexpr Real kDeepest = 40;
   const Real total = majorant.total_depth();
   if (!(total > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
   if (total > kDeepest) return {};

@@ -12,7 +12,7 @@ namespace nullmark {
 ///   L(s) = int_s^M q e^{-q (z - s)} (1 + L(z)) dz,   R(s) = int_s^M q e^{-q (z - s)} (1 + 2 L(z) + R(z)) dz,
 ///
 /// Volterra equations of the second kind, solved from the ray's end back by collocation at Gauss points, with cuts where q
-/// reaches `least`.  The first rate is 1, or that of a lookup where the ray's rate begins.  Nothing for rays deeper than 32: its cost grows with the square.
+/// reaches `least`.  The first rate is 1, or that of a lookup where the ray's rate begins.  Nothing for rays deeper than 40: its cost grows with the square.
 Theory guided_moments(const Rates& majorant, const RayProfile& profile, int c, Real least, bool start_looked_up);
 
 }  // namespace nullmark

@@ -54,12 +54,14 @@ void expect_agreement(const CellRecord& record) {
   ASSERT_EQ(record.status, Status::ok) << record.reason;
   EXPECT_EQ(record.majorant_violations, 0u);
   const auto samples = static_cast<Real>(record.samples);
+  // Its fourth moments are infinite long before its variance is; guided_test.cpp holds the latter to the series, term by term.
+  const bool infinite_kurtosis = record.cell.estimator.type == "taylor_pink_noise";
   for (const ChannelRecord& channel : record.channel) {
     ASSERT_TRUE(channel.bias && channel.mean && channel.reference);
     const Real rounding = 1e-13 + *channel.reference_error;
     if (!channel.variance_theory) continue;
     EXPECT_LT(std::abs(*channel.bias), 5.5 * std::sqrt(*channel.variance_theory / samples) + rounding);
-    if (*channel.relative_variance < 100 && *channel.relative_variance > 1e-12) {
+    if (*channel.relative_variance < 100 && *channel.relative_variance > 1e-12 && !infinite_kurtosis) {
       EXPECT_NEAR(*channel.variance / *channel.variance_theory, 1, 0.05);
     }
   }
