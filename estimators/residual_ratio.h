@@ -78,7 +78,8 @@ struct ResidualRatioTracking {
   }
 
   Value result(const Walk& walk, const auto& ray) const {
-    return product(ray.with_control ? Value(-ray.control.depth) : Value(ray.value(0)), walk.weight, roots(ray));
+    if (!ray.with_control) return product(ray.value(0), walk.weight, roots(ray));
+    return product(Value(-ray.control.depth), walk.weight, roots(ray));
   }
 
   Value transmittance_at(const Walk& walk, const Ray& ray, Real distance) const {
@@ -119,6 +120,7 @@ struct ResidualRatioTracking {
 
   /// e^log_control W, given the 2^roots-th root of W.
   static Value product(const Value& log_control, const Value& root, int roots) {
+    if (roots == 0) return exponential(log_control) * root;
     Value x = exponential(Value(log_control * std::ldexp(Real{1}, -roots))) * root;
     for (; roots > 0; --roots) x = signed_square(x);
     return x;
