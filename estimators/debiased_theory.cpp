@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <array>
 #include <boost/math/quadrature/gauss.hpp>
+#include <boost/math/special_functions/bessel.hpp>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -137,6 +138,12 @@ class SymmetricMoments {
 };
 
 }  // namespace
+
+Real jackknife_factor(int m, Real s) {
+  if (m == 2) return std::cos(s);
+  if (m == 4) return s > 0 ? std::sin(s) / s : 1;
+  return std::isfinite(s) ? boost::math::cyl_bessel_j(0, s) : s;
+}
 
 std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Real steps, bool endpoint_matching) {
   if (constant(profile, c)) return 0;

@@ -13,6 +13,10 @@ inline Real march_difference(Real even, Real odd) {
   return -exponential(-std::min(even, odd)) * closer * closer / 2;
 }
 
+/// Gamma(nu + 1) (2/S)^nu J_nu(S), nu = (m - 3)/2: cos S, J_0(S), sin S/S for m = 2, 3, 4.  What makes e^{-Xbar} of m normal
+/// numbers unbiased, S^2 = mean X^2 - Xbar^2 [Peters 2025].
+Real jackknife_factor(int m, Real s);
+
 /// Of Telescoping.  Levels n are summed until the squared differences of those left out, taken for a geometric series, are below
 /// 10^-4 of the variance, and then added as such; what their base terms and cross terms add is known.  Nothing where levels do
 /// not fall off before they take too many lookups.

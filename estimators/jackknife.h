@@ -1,7 +1,5 @@
 #pragma once
 
-#include <boost/math/special_functions/bessel.hpp>
-
 #include "estimators/debiased_theory.h"
 #include "estimators/estimator.h"
 
@@ -89,7 +87,7 @@ struct Jackknife {
     Value transmittance = exponential(Value(-walk.mean));
     if (!ray.naive)
       for (int c = 0; c < ray.channels; ++c)
-        channel(transmittance, c) *= factor(std::sqrt(std::max<Real>(0, channel(walk.squares, c) / m)));
+        channel(transmittance, c) *= jackknife_factor(m, std::sqrt(std::max<Real>(0, channel(walk.squares, c) / m)));
     return transmittance;
   }
 
@@ -99,14 +97,6 @@ struct Jackknife {
     theory.lookups = m * static_cast<Real>(steps);
     theory.lookups_variance = 0;
     return theory;
-  }
-
- private:
-  /// Gamma(nu + 1) (2/S)^nu J_nu(S).
-  Real factor(Real s) const {
-    if (m == 2) return std::cos(s);
-    if (m == 4) return s > 0 ? std::sin(s) / s : 1;
-    return std::isfinite(s) ? boost::math::cyl_bessel_j(0, s) : s;
   }
 };
 

@@ -290,6 +290,7 @@ ExitCode run_command(const RunCommand& command) {
   run.config_text = plan.config_text;
   run.provenance = make_provenance(context, std::chrono::system_clock::now());
   run.tables = plan.tables;
+  run.claims = plan.claims;
   for (auto& [place, record] : earlier) run.cells.push_back(std::move(record));
   if (to_stdout) {
     fmt::print("{}", results_text(run));

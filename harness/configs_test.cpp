@@ -1,5 +1,6 @@
 // The shipped configurations give what the README says they give.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <boost/math/quadrature/gauss_kronrod.hpp>
@@ -7,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <set>
 
 #include "estimators/transport/phase.h"
 #include "harness/config.h"
@@ -120,6 +122,18 @@ TEST(Configs, Seed004TableIsReproducedAndCorrected) {
 }
 
 /// E[T_r] = T / T_c: residual and product means agree with their references to 5.5 standard errors.
+TEST(Configs, EveryClaimOfTheListIsPutToTheTest) {
+  const Plan claims = shipped("claims");
+  std::set<std::string> ids;
+  for (const PublishedClaim& claim : claims.claims) ids.insert(claim.id);
+  std::vector<std::string> listed = {"004-1", "004-2", "004-3", "004-4", "004-5", "004-6",
+                                     "003-1", "003-2", "003-3", "000-1", "000-2", "000-3"};
+  // The list has no 35.
+  for (int i = 1; i <= 50; ++i)
+    if (i != 35) listed.push_back(fmt::format("C{:02}", i));
+  for (const std::string& id : listed) EXPECT_TRUE(ids.count(id)) << id;
+}
+
 TEST(Configs, Seed000ResidualsHaveTheirExpectation) {
   Plan plan = shipped("seed_000_controls.json");
   std::vector<bool> selected;

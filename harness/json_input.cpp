@@ -195,6 +195,12 @@ Real Place::number() const {
   return value_->get<Real>();
 }
 
+Real Place::positive() const {
+  const Real value = number();
+  if (!(value > 0) || !std::isfinite(value)) expected("a finite number > 0");
+  return value;
+}
+
 std::uint64_t Place::unsigned_integer(std::uint64_t low, std::uint64_t high) const {
   const std::string expectation = high == std::numeric_limits<std::uint64_t>::max()
                                       ? fmt::format("a whole number >= {}", low)

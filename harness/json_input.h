@@ -55,6 +55,8 @@ class Place {
   /// A string out of a list of names; `what` is how an error calls them: "unknown quantity".
   std::string one_of(const std::vector<std::string>& names, const char* what) const;
   Real number() const;
+  /// A finite number above 0.
+  Real positive() const;
   /// A whole number; 1e3 counts as one.
   std::uint64_t unsigned_integer(std::uint64_t low, std::uint64_t high) const;
   std::int64_t integer(std::int64_t low, std::int64_t high) const;

@@ -56,6 +56,7 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
   merged.name = parts[0].name;
   merged.config_text = parts[0].config_text;
   merged.tables = parts[0].tables;
+  merged.claims = parts[0].claims;
   merged.provenance = parts[0].provenance;
   Json list = Json::array();
   for (const RunRecord& part : parts) {

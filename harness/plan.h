@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "estimators/estimator.h"
+#include "harness/published_claim.h"
 
 namespace nullmark {
 
@@ -164,6 +165,7 @@ struct Plan {
   TimingPlan timing;
   GateLevels levels;
   std::vector<Table> tables;
+  std::vector<PublishedClaim> claims;
   std::map<std::string, std::string> credits;  ///< author and licence, by a data file's name
   std::string config_text;                     ///< the configuration as applied, JSON
 };

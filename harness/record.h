@@ -18,6 +18,7 @@ enum class Status { ok, skipped, not_run, error };
 struct ChannelRecord {
   std::optional<Real> mean, reference, reference_error;  ///< averages over the rays
   std::optional<Real> bias;                              ///< mean - reference
+  std::optional<Real> bias_theory;                       ///< mean that the estimator predicts - reference
   std::optional<Real> rmse;                              ///< over the rays' means
   std::optional<Real> rmse_theory;                       ///< sqrt(mean over rays of variance_theory / n + predicted bias^2)
   std::optional<Real> variance;                          ///< per sample, averaged over the rays
@@ -143,6 +144,7 @@ struct RunRecord {
   std::map<std::string, std::string> provenance;  ///< values are JSON texts
   std::vector<CellRecord> cells;
   std::vector<Table> tables;
+  std::vector<PublishedClaim> claims;
 };
 
 }  // namespace nullmark

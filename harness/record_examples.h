@@ -15,7 +15,13 @@ inline Plan example_plan() {
     "matrix":{"estimator":["ratio",{"type":"residual_ratio","control":"average"}],
               "medium":["linear",{"type":"layers","values":[1,2,3],"lo":[-1,0,0],"spectrum":[1,2,4]}]}}],
     "tables":[{"title":"T","rows":[{"label":"R","given":{"paper":0.1},"note":"not reproduced",
-               "cells":{"here":{"estimator":"ratio","medium":"linear"}},"theory":{"estimator":"ratio","medium":"linear"}}]}]})",
+               "cells":{"here":{"estimator":"ratio","medium":"linear"}},"theory":{"estimator":"ratio","medium":"linear"}}]}],
+    "claims":[{"id":"C","source":"S","claim":"so it is","note":"nearly","parts":[
+      {"says":"a","metric":"variance","cells":{"estimator":"ratio"},"at_most":{"estimator":"residual_ratio"},"factor":2},
+      {"metric":"mean","cells":[{"medium":"linear"}],"near":[1,2],"tolerance":0.1},
+      {"metric":"lookups_per_sample","cells":{"estimator":"ratio"},"at_least":"theory"},
+      {"cells":{"medium":"linear"},"unbiased":true},
+      {"metric":"rmse","cells":{},"slope_against":"samples_per_ray","near":-0.5,"tolerance":0.1}]}]})",
       "example.json");
 }
 
@@ -25,6 +31,7 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
   run.name = plan.name;
   run.config_text = plan.config_text;
   run.tables = plan.tables;
+  run.claims = plan.claims;
   run.provenance = {{"start", "\"2026-01-02T03:04:05Z\""}, {"cpu", R"({"model":"x","cores":8})"}};
   Real number = 0.1;
   const auto next = [&] { return number = number * 1.7 + 1e-17; };
@@ -45,7 +52,8 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
     record.reference_method = "closed_form";
     record.variance_basis = "analytic";
     for (int c = 0; c < record.channels; ++c)
-      record.channel.push_back({next(), next(), next(), -next(), next(), next(), next(), next(), next(), next(), next()});
+      record.channel.push_back(
+          {next(), next(), next(), -next(), next(), next(), next(), next(), next(), next(), next(), next()});
     record.channel[0].kurtosis.reset();
     record.lookups_per_sample = next();
     record.lookups_theory = 5e-324;

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/claims_json.h"
 #include "harness/cost.h"
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 #include "harness/spec_json.h"
+#include "harness/tables_json.h"
 #include "harness/transport_json.h"
 #include "harness/verdict_json.h"
 
@@ -223,6 +225,7 @@ void read_statistics(const Place& place, CellRecord& record) {
   };
   read(place, "mean", &ChannelRecord::mean);
   read(place, "bias", &ChannelRecord::bias);
+  read(place, "bias_theory", &ChannelRecord::bias_theory);
   read(place, "rmse", &ChannelRecord::rmse);
   read(place, "rmse_theory", &ChannelRecord::rmse_theory);
   read(place, "variance", &ChannelRecord::variance);
@@ -232,30 +235,6 @@ void read_statistics(const Place& place, CellRecord& record) {
   read(place["reference"], "value", &ChannelRecord::reference);
   read(place["reference"], "error", &ChannelRecord::reference_error);
   read(place["reference"], "rms", &ChannelRecord::reference_rms);
-}
-
-std::vector<Table> read_tables(const Place& place) {
-  std::vector<Table> tables;
-  for (const Place& entry : place.elements()) {
-    Table table{entry["title"].string(), entry["metric"].string(), {}};
-    for (const Place& at : entry["rows"].elements()) {
-      TableRow row;
-      row.label = at["label"].string();
-      row.note = string_or_empty(at, "note");
-      at["given"].expect_object();
-      for (const auto& [heading, json] : at["given"].json().items())
-        row.given.emplace_back(heading, at["given"][heading].number());
-      at["cells"].expect_object();
-      for (const auto& [heading, json] : at["cells"].json().items())
-        row.cells.emplace_back(heading, at["cells"][heading]["cell"].string());
-      if (at.has("theory")) row.theory_of = at["theory"]["cell"].string();
-      if (at.has("relative_to")) row.relative_to = at["relative_to"]["cell"].string();
-      row.tolerance = optional_real(at, "tolerance");
-      table.rows.push_back(std::move(row));
-    }
-    tables.push_back(std::move(table));
-  }
-  return tables;
 }
 
 }  // namespace
@@ -305,6 +284,7 @@ Json cell_json(const CellRecord& record) {
         {"rms", field(record, &ChannelRecord::reference_rms)},
         {"method", record.reference_method}}},
       {"bias", field(record, &ChannelRecord::bias)},
+      {"bias_theory", field(record, &ChannelRecord::bias_theory)},
       {"rmse", field(record, &ChannelRecord::rmse)},
       {"rmse_theory", field(record, &ChannelRecord::rmse_theory)},
       {"variance", field(record, &ChannelRecord::variance)},
@@ -414,7 +394,9 @@ std::string results_text(const RunRecord& run) {
     text += i == 0 ? "\n" : ",\n";
     text += cell_json(run.cells[i]).dump();
   }
-  text += fmt::format("\n],\n\"tables\": {}\n}}\n", tables_json(run.tables).dump());
+  text += fmt::format("\n],\n\"tables\": {}", tables_json(run.tables).dump());
+  if (!run.claims.empty()) text += fmt::format(",\n\"claims\": {}", claims_json(run.claims).dump());
+  text += "\n}\n";
   return text;
 }
 
@@ -436,7 +418,8 @@ RunRecord read_results(const std::string& text, const std::string& file) {
   top["provenance"].expect_object();
   for (const auto& [key, value] : top["provenance"].json().items()) run.provenance[key] = value.dump();
   for (const Place& cell : top["cells"].elements()) run.cells.push_back(read_cell(cell));
-  if (top.has("tables")) run.tables = read_tables(top["tables"]);
+  if (top.has("tables")) run.tables = read_tables(top["tables"], CellFinder());
+  if (top.has("claims")) run.claims = read_claims(top["claims"], CellFinder());
   return run;
 }
 

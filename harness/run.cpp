@@ -525,6 +525,7 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
       out.rmse_theory = finite(std::sqrt(*prepared.theory.variance[o] / samples + prepared.theory.squared_bias[o].value_or(0)));
       record.variance_basis = "analytic";
     }
+    if (o < prepared.theory.bias.size() && prepared.theory.bias[o]) out.bias_theory = finite(*prepared.theory.bias[o]);
     const std::optional<Real> best = out.variance_theory ? out.variance_theory : out.variance;
     if (best && reference_square > 0) out.relative_variance = finite(*best * n / reference_square);
     const auto count = static_cast<Real>(pooled.count);
@@ -543,8 +544,8 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
   }
 }
 
-/// What a cell's pixels hold, unrounded but for single precision: mean, reference and variance per channel, lookups and null
-/// collisions.
+/// What a cell's pixels hold, unrounded but for single precision: mean, reference, variance and what theory says of it per
+/// channel, lookups and null collisions.
 std::vector<Layer> layers(const PreparedCell& prepared, const Sampled& sampled) {
   const std::size_t outputs = prepared.targets.outputs, rays = prepared.scene->rays->world.size();
   std::vector<Layer> all;
@@ -560,6 +561,8 @@ std::vector<Layer> layers(const PreparedCell& prepared, const Sampled& sampled) 
     add(fmt::format("mean.{}", o), [&](std::size_t ray) { return truth(ray) + moments(ray).mean(); });
     if (prepared.targets.known) add(fmt::format("reference.{}", o), truth);
     add(fmt::format("variance.{}", o), [&](std::size_t ray) { return moments(ray).variance(); });
+    if (!prepared.theory.ray_variance.empty())
+      add(fmt::format("variance_theory.{}", o), [&](std::size_t ray) { return prepared.theory.ray_variance[ray * outputs + o]; });
   }
   const auto per_sample = [&](std::uint64_t count) {
     return static_cast<Real>(count) / static_cast<Real>(prepared.samples_per_ray);

@@ -162,7 +162,30 @@ Json definitions() {
        {"tolerance", described(positive(), "relative; check fails where a cell is farther from the first given number")},
        {"note", {{"type", "string"}}}},
       {"label"});
-  return {{"estimator", component_schema(ComponentKind::estimator)},
+  const Json metric = {{"enum", metric_names()}};
+  const Json compared = {{"anyOf",
+                          {{{"type", "number"}}, list_of({{"type", "number"}}, 1), {{"const", "theory"}}, one_or_list(reference("cells"))}}};
+  const Json part = closed_object(
+      {{"says", described({{"type", "string"}}, "this part of the claim in words")},
+       {"metric", metric},
+       {"cells", one_or_list(reference("cells"))},
+       {"near", described(compared, "a number, one for each cell, \"theory\" of each cell, or the same metric of a counterpart")},
+       {"at_most", compared},
+       {"at_least", compared},
+       {"unbiased", described({{"const", true}}, "the verdict of every cell is PASS")},
+       {"factor", described({{"type", "number"}}, "on what is compared with")},
+       {"tolerance", described(positive(), "relative, of \"near\"")},
+       {"slope_against", described(metric, "compare the slope of log metric over the log of this one")}},
+      {"cells"});
+  const Json claim = closed_object({{"id", {{"type", "string"}}},
+                                    {"source", described({{"type", "string"}}, "paper and place")},
+                                    {"claim", {{"type", "string"}}},
+                                    {"note", described({{"type", "string"}}, "how the test differs from the publication")},
+                                    {"parts", list_of(part, 1)}},
+                                   {"id", "source", "claim", "parts"});
+  return {{"claim", claim},
+          {"cells", described(closed_object(Json(selector)), "matches at least one cell")},
+          {"estimator", component_schema(ComponentKind::estimator)},
           {"medium", component_schema(ComponentKind::medium)},
           {"majorant", component_schema(ComponentKind::majorant)},
           {"rays", component_schema(ComponentKind::ray_set)},
@@ -234,6 +257,7 @@ Json cell_schema() {
                                     {"method", text}},
                                    {"value", "error", "method"})},
        {"bias", statistic("mean - reference")},
+       {"bias_theory", statistic("mean that the estimator predicts - reference")},
        {"rmse", statistic("root mean square error of the rays' means")},
        {"rmse_theory", statistic("what theory predicts for rmse")},
        {"variance", statistic("per sample, averaged over the rays")},
@@ -322,6 +346,7 @@ Json config_schema() {
                                   {"alpha_pass", described(positive(), "chance of a false PASS, of each test")}})},
        {"experiments", list_of(reference("experiment"), 1)},
        {"tables", list_of(reference("table"))},
+       {"claims", list_of(reference("claim"))},
        {"credits", described({{"type", "object"}, {"additionalProperties", {{"type", "string"}}}},
                              "author and licence, by a data file's name")}},
       {"$schema", "experiments"}));
@@ -337,7 +362,8 @@ Json results_schema() {
                              {"config", {{"type", {"object", "null"}}, {"description", "as applied: every cell is named"}}},
                              {"provenance", {{"type", "object"}}},
                              {"cells", list_of(cell_schema())},
-                             {"tables", list_of({{"type", "object"}})}},
+                             {"tables", list_of({{"type", "object"}})},
+                             {"claims", list_of({{"type", "object"}})}},
                             {"nullmark_schema", "name", "config", "provenance", "cells"}));
   return json;
 }

@@ -44,7 +44,7 @@ class Checker {
 
 TEST(Schema, AcceptsTheConfigurationsOfTheTree) {
   const Checker check(config_schema());
-  for (const auto& entry : std::filesystem::directory_iterator(NULLMARK_SOURCE_DIR "/configs"))
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(NULLMARK_SOURCE_DIR "/configs"))
     if (entry.path().extension() == ".json") {
       EXPECT_EQ(check(read_file(entry.path().string())), "") << entry.path();
     }

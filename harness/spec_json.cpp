@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "harness/claims_json.h"
 #include "harness/hash.h"
 #include "harness/names.h"
+#include "harness/tables_json.h"
 #include "harness/transport_json.h"
 
 namespace nullmark {
@@ -85,25 +87,6 @@ Json gate_json(const GateSpec& gate) {
   return json;
 }
 
-Json tables_json(const std::vector<Table>& tables) {
-  Json list = Json::array();
-  for (const Table& table : tables) {
-    Json rows = Json::array();
-    for (const TableRow& row : table.rows) {
-      Json entry = {{"label", row.label}, {"given", Json::object()}, {"cells", Json::object()}};
-      for (const auto& [heading, number] : row.given) entry["given"][heading] = number;
-      for (const auto& [heading, cell] : row.cells) entry["cells"][heading] = {{"cell", cell}};
-      if (row.theory_of) entry["theory"] = {{"cell", *row.theory_of}};
-      if (row.relative_to) entry["relative_to"] = {{"cell", *row.relative_to}};
-      if (row.tolerance) entry["tolerance"] = *row.tolerance;
-      if (!row.note.empty()) entry["note"] = row.note;
-      rows.push_back(std::move(entry));
-    }
-    list.push_back({{"title", table.title}, {"metric", table.metric}, {"rows", std::move(rows)}});
-  }
-  return list;
-}
-
 std::string cell_id(const Plan& plan, const Cell& cell) { return hexadecimal(fnv1a(deciding_json(plan, cell).dump())); }
 
 std::string applied_config(const Plan& plan) {
@@ -130,6 +113,7 @@ std::string applied_config(const Plan& plan) {
                {"verdict", {{"alpha", plan.levels.alpha}, {"alpha_pass", plan.levels.alpha_pass}}},
                {"experiments", std::move(experiments)},
                {"tables", tables_json(plan.tables)}};
+  if (!plan.claims.empty()) json["claims"] = claims_json(plan.claims);
   if (!plan.credits.empty()) json["credits"] = plan.credits;
   return json.dump();
 }

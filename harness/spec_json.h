@@ -21,8 +21,6 @@ Json measurement_json(const Measurement& measurement);
 /// In the order of LawPolicy.
 const std::vector<std::string>& law_policies();
 Json gate_json(const GateSpec& gate);
-/// Cells are referred to by name: {"cell": "ratio/linear/global"}.
-Json tables_json(const std::vector<Table>& tables);
 
 /// What decides a cell's statistics, as canonical text, hashed to 16 hexadecimal digits.
 std::string cell_id(const Plan& plan, const Cell& cell);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "harness/findings_text.h"
 #include "harness/json_input.h"
 #include "harness/junit.h"
 #include "harness/results_json.h"
@@ -180,6 +181,7 @@ Summary summarise(RunRecord& run) {
   const bool order_failed =
       std::any_of(summary.orders.begin(), summary.orders.end(), [](const OrderFit& fit) { return fit.outcome == Outcome::fail; });
   summary.expectations = expectations(run);
+  summary.findings = findings(run);
   const bool disappointed = std::any_of(summary.expectations.begin(), summary.expectations.end(),
                                         [](const Expectation& one) { return one.measured && !one.met; });
   if (summary.fail > 0 || order_failed || disappointed)
@@ -203,6 +205,7 @@ std::string summary_text(const RunRecord& run, const Summary& summary) {
     if (!one.met) text += fmt::format("{}: {}\n", one.measured ? "EXPECTED OTHERWISE" : "NOT MEASURED", expectation_line(one));
   if (!summary.expectations.empty())
     text += fmt::format("{} of {} expected numbers met\n", met(summary.expectations), summary.expectations.size());
+  if (!summary.findings.empty()) text += findings_text(summary.findings);
   if (summary.never_started > 0) text += fmt::format("{} cells of the configuration were never started\n", summary.never_started);
   if (summary.altered > 0) text += fmt::format("{} verdicts in the file are not what its figures say\n", summary.altered);
   return text + fmt::format("{}\n{}\n", counts(summary), families(run));
@@ -233,6 +236,7 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
     for (const Expectation& one : summary.expectations)
       if (!one.met) text += fmt::format("- {}\n", escaped(expectation_line(one)));
   }
+  if (!summary.findings.empty()) text += fmt::format("\n{}", findings_markdown(summary.findings));
   if (!summary.orders.empty()) {
     text += "\n| convergence order |\n|---|\n";
     for (const OrderFit& fit : summary.orders) text += fmt::format("| {} |\n", order_line(fit));

@@ -4,6 +4,7 @@
 
 #include "harness/exit_code.h"
 #include "harness/expectation.h"
+#include "harness/findings.h"
 #include "harness/order.h"
 #include "harness/record.h"
 
@@ -16,6 +17,7 @@ struct Summary {
   std::size_t altered = 0;        ///< verdicts in the file that its own figures do not bear out
   std::vector<OrderFit> orders;
   std::vector<Expectation> expectations;  ///< numbers that the configuration expects of its cells
+  std::vector<ClaimFinding> findings;     ///< published claims; a refuted one is a result, no failure
   ExitCode exit = ExitCode::ok;
 };
 

@@ -1,3 +1,4 @@
+#include "media/canonical.h"
 #include "media/checkerboard.h"
 #include "media/cosine.h"
 #include "media/exponential.h"
@@ -12,6 +13,7 @@
 
 namespace nullmark {
 
+NULLMARK_REGISTER_MEDIUM(CanonicalMediumSource);
 NULLMARK_REGISTER_MEDIUM(FieldSource<Checkerboard>);
 NULLMARK_REGISTER_MEDIUM(FieldSource<Cosine>);
 NULLMARK_REGISTER_MEDIUM(FieldSource<Exponential>);

@@ -10,6 +10,7 @@
 #include "harness/cell_names.h"
 #include "harness/comparison.h"
 #include "harness/expectation.h"
+#include "harness/findings_text.h"
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/provenance.h"
@@ -275,6 +276,21 @@ Json table_json(const Table& table, const CellsByName& cells, const Places& plac
   return {{"title", table.title}, {"metric", table.metric}, {"columns", columns}, {"rows", std::move(rows)}};
 }
 
+Json claim_json(const ClaimFinding& finding, const CellsByName& cells, const Places& places) {
+  Json parts = Json::array();
+  for (const PartFinding& part : finding.parts) {
+    Json of_cells = Json::array();
+    for (const std::string& name : part.part->cells)
+      if (const auto at = cells.find(name); at != cells.end()) of_cells.push_back(places.at(at->second));
+    parts.push_back({{"says", part.part->says},
+                     {"finding", to_string(part.outcome)},
+                     {"figures", figures_of(part)},
+                     {"cells", std::move(of_cells)}});
+  }
+  return {{"id", finding.claim->id},     {"source", finding.claim->source},       {"claim", finding.claim->claim},
+          {"note", finding.claim->note}, {"finding", to_string(finding.outcome)}, {"parts", std::move(parts)}};
+}
+
 Json matrix_json(const std::vector<Contest>& all, const Places& places) {
   std::vector<std::string> rows;
   for (const Contest& contest : all)
@@ -389,6 +405,7 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
   json["runs"] = Json::array();
   json["cells"] = Json::array();
   json["tables"] = Json::array();
+  json["claims"] = Json::array();
   for (std::size_t run = 0; run < runs.size(); ++run) {
     title += (title.empty() ? "" : " + ") + runs[run].name;
     json["runs"].push_back(run_json(runs[run], files[run]));
@@ -399,6 +416,7 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
     }
     const CellsByName cells = cells_by_name(runs[run]);
     for (const Table& table : runs[run].tables) json["tables"].push_back(table_json(table, cells, places));
+    for (const ClaimFinding& finding : findings(runs[run])) json["claims"].push_back(claim_json(finding, cells, places));
   }
   const std::vector<Contest> all = contests(runs, baseline);
   json["scenes"] = Json::array();

@@ -96,7 +96,7 @@ Json ReportImages::add(const CellRecord& record, const std::string& results_file
   }
   const int factor = (std::max(image.width, image.height) + kMostPixels - 1) / kMostPixels;
   Json places = Json::object();
-  for (const char* kind : {"mean", "reference", "variance", "lookups", "null_collisions"}) {
+  for (const char* kind : {"mean", "reference", "variance", "variance_theory", "lookups", "null_collisions"}) {
     const Picture picture = of_kind(image, kind);
     if (picture.values.empty()) continue;
     Json json = quantised(shrunk(picture, factor));

@@ -3,6 +3,7 @@
 const sections = [
   { id: "summary", title: "Summary", says: "How many trackers keep their claims, and which one is fastest where.", present: () => true, build: buildSummary },
   { id: "tables", title: "Tables", says: "Do the figures that someone published come out again, and where they do not, what makes the difference?", present: () => report.tables.length > 0, build: buildTables },
+  { id: "claims", title: "Claims", says: "Does what was published hold? A refuted claim is a result; what cannot be told needs more samples, or a scene that is not here.", present: () => report.claims.length > 0, build: buildClaims },
   { id: "ranking", title: "Ranking", says: "Which tracker reaches an error soonest; = marks those that the measurements cannot tell apart. Brackets are 95 % intervals.", present: () => report.cells.some((cell) => cell.cost), build: buildRanking },
   { id: "error", title: "Error", says: "How the error falls with work: parallel to the dotted line where it is noise alone, level where bias is left.", present: () => usefulConvergenceViews().length > 0, build: buildError },
   { id: "pareto", title: "Pareto front", says: "Which trackers no other beats in both variance and time of a sample.", present: () => report.cells.some(hasParetoPoint), build: buildPareto },

@@ -61,6 +61,7 @@ const imageKinds = {
   mean: { title: "estimate", of: imageNamed("mean"), colours: greys },
   error: { title: "signed error", of: combinedOf("error", "mean", "reference", (a, b) => a - b), colours: blueToOrange, signed: true },
   variance: { title: "variance", of: imageNamed("variance"), colours: cividis },
+  variance_theory: { title: "variance, theory", of: imageNamed("variance_theory"), colours: cividis },
   lookups: { title: "lookups", of: imageNamed("lookups"), colours: viridis },
   null_collisions: { title: "null collisions", of: imageNamed("null_collisions"), colours: viridis },
   product: { title: "variance × lookups", of: combinedOf("product", "variance", "lookups", (a, b) => a * b), colours: cividis },
@@ -274,7 +275,7 @@ function titleLine(kind) {
 }
 
 function mapTiles(cell, cells, scales, heading) {
-  const kinds = ["variance", "lookups", "null_collisions", "product"].map((name) => imageKinds[name]).filter((kind) => kind.of(cell));
+  const kinds = ["variance", "variance_theory", "lookups", "null_collisions", "product"].map((name) => imageKinds[name]).filter((kind) => kind.of(cell));
   return kinds.map((kind) => {
     const images = scales.shared ? cells.map(kind.of).filter(Boolean) : [kind.of(cell)];
     const range = scales.logarithmic ? logRange(images) : rangeOf(kind, images);

@@ -3,6 +3,7 @@
 #include "media/majorants/kd_tree.h"
 #include "media/majorants/octree.h"
 #include "media/majorants/prescribed.h"
+#include "media/majorants/ray_maximum.h"
 
 namespace nullmark {
 
@@ -11,5 +12,6 @@ NULLMARK_REGISTER_MAJORANT(GridMajorantSource);
 NULLMARK_REGISTER_MAJORANT(KdTreeSource);
 NULLMARK_REGISTER_MAJORANT(OctreeSource);
 NULLMARK_REGISTER_MAJORANT(PrescribedMajorantSource);
+NULLMARK_REGISTER_MAJORANT(RayMaximumSource);
 
 }  // namespace nullmark
