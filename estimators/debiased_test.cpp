@@ -14,10 +14,9 @@
 #include "estimators/jackknife.h"
 #include "estimators/telescoping.h"
 #include "estimators/unbiased_ray_marching.h"
+#include "media/built_media.h"
 #include "media/exponential.h"
-#include "media/homogeneous.h"
 #include "media/layers.h"
-#include "media/linear.h"
 
 namespace nullmark {
 namespace {
@@ -26,25 +25,6 @@ namespace {
 constexpr Real kSigmas = 5.5, kLevel = 1e-7;
 
 const Real kHalf = std::log(2.), kTenth = std::log(10.);
-
-template <class Field>
-std::shared_ptr<const Medium> built(Field field) {
-  if constexpr (requires { field.prepare(); }) field.prepare();
-  return std::make_shared<FieldMedium<Field>>(std::move(field));
-}
-
-std::shared_ptr<const Medium> constant(Real value) {
-  Homogeneous field;
-  field.value = value;
-  return built(field);
-}
-
-std::shared_ptr<const Medium> linear(Real begin, Real end, Real depth = 0) {
-  Linear field;
-  field.profile = {begin, end};
-  field.target_depth = depth;
-  return built(field);
-}
 
 /// 3 e^{-3x}.
 std::shared_ptr<const Medium> falling() {

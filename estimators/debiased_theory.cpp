@@ -164,10 +164,7 @@ std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Re
   for (Real& x : depth->x) x = tau - x;
   // p(n) of the roulette, and what pivots add at first order: the mean of n + 1 marches.
   std::array<Real, kMostOrder + 1> chance{0.9, 0, 0.1};
-  for (int n = 2; n <= kMostOrder; ++n) {
-    const auto at = static_cast<std::size_t>(n);
-    if (n > 2) chance[at] = chance[at - 1] * 2 / n;
-  }
+  for (std::size_t n = 3; n <= kMostOrder; ++n) chance[n] = chance[n - 1] * 2 / static_cast<Real>(n);
   for (std::size_t n = 2; n < kMostOrder; ++n) chance[n] -= chance[n + 1];
   const Real spread = depth->variance();
   constexpr Real kFirstOrder = 1e-12;

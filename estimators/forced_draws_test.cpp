@@ -10,10 +10,9 @@
 #include "estimators/hand_walked.h"
 #include "every_estimator.h"
 #include "harness/lane_kernel.h"
+#include "media/built_media.h"
 #include "media/channels.h"
-#include "media/homogeneous.h"
 #include "media/layers.h"
-#include "media/linear.h"
 
 namespace nullmark {
 namespace {
@@ -40,25 +39,10 @@ class ForcedRng {
   Real forced_;
 };
 
-template <class Field>
-std::shared_ptr<const Medium> built(Field field) {
-  if constexpr (requires { field.prepare(); }) field.prepare();
-  return std::make_shared<FieldMedium<Field>>(std::move(field));
-}
-
-std::shared_ptr<const Medium> linear(Real begin, Real end) {
-  Linear field;
-  field.profile = {begin, end};
-  return built(field);
-}
-
 std::vector<std::shared_ptr<const Medium>> media() {
-  Homogeneous constant, vacuum;
-  constant.value = 2;
-  vacuum.value = 0;
   Layers gap;
   gap.profile.values = {0, 3, 0, 1};
-  return {built(constant), built(vacuum), linear(0, 3), linear(0, 5e-324), built(gap)};
+  return {constant(2), constant(0), linear(0, 3), linear(0, 5e-324), built(gap)};
 }
 
 template <class E, class Ray>
@@ -86,8 +70,8 @@ void hold(const std::shared_ptr<const Medium>& medium) {
           const auto outcome = walked.walk(rng, kMostLookups);
           reached = reached || rng.reached();
           if (outcome.lookups == kMostLookups) continue;
-          const std::string where = fmt::format("{} channels, {}, u = {} at draw {} of sample {}", walked.ray.channels, with,
-                                                forced, at, sample);
+          const std::string where =
+              fmt::format("{} channels, {}, u = {} at draw {} of sample {}", walked.ray.channels, with, forced, at, sample);
           using Walked = HandWalked<E, Value>;
           constexpr bool kTells = tells_events<E<Value>, typename Walked::Passage>();
           constexpr SampleRange kRange = E<Value>::kRange;
@@ -109,7 +93,8 @@ void hold(const std::shared_ptr<const Medium>& medium) {
   };
   for (const Real looseness : {1., 4.})
     for (const int pieces : {1, 4})
-      walk_all(HandWalked<E, Value>(tracker, medium, 1, looseness, pieces), fmt::format("looseness {}, {} pieces", looseness, pieces));
+      walk_all(HandWalked<E, Value>(tracker, medium, 1, looseness, pieces),
+               fmt::format("looseness {}, {} pieces", looseness, pieces));
 }
 
 /// In float, one lane: the state before a call is set so that its first draw is 0 or the largest below 1.

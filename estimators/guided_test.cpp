@@ -12,11 +12,10 @@
 #include "estimators/majorant_guided_ratio.h"
 #include "estimators/progressive_majorant.h"
 #include "estimators/taylor_pink_noise.h"
+#include "media/built_media.h"
 #include "media/channels.h"
 #include "media/exponential.h"
-#include "media/homogeneous.h"
 #include "media/layers.h"
-#include "media/linear.h"
 
 namespace nullmark {
 namespace {
@@ -25,25 +24,6 @@ namespace {
 constexpr Real kSigmas = 5.5;
 
 const Real kHalf = std::log(2.);
-
-template <class Field>
-std::shared_ptr<const Medium> built(Field field) {
-  if constexpr (requires { field.prepare(); }) field.prepare();
-  return std::make_shared<FieldMedium<Field>>(std::move(field));
-}
-
-std::shared_ptr<const Medium> constant(Real value) {
-  Homogeneous field;
-  field.value = value;
-  return built(field);
-}
-
-std::shared_ptr<const Medium> linear(Real begin, Real end, Real depth = 0) {
-  Linear field;
-  field.profile = {begin, end};
-  field.target_depth = depth;
-  return built(field);
-}
 
 MajorantGuidedRatio<Real> guided(const char* start) {
   MajorantGuidedRatio<Real> tracker;

@@ -8,28 +8,13 @@
 #include "estimators/hand_walked.h"
 #include "estimators/mis_bidirectional.h"
 #include "estimators/mis_unidirectional.h"
-#include "media/homogeneous.h"
-#include "media/linear.h"
+#include "media/built_media.h"
 
 namespace nullmark {
 namespace {
 
 /// Statistical tests here are two-sided at 5.5 standard errors, 4e-8 each, on fixed streams.
 constexpr Real kSigmas = 5.5;
-
-std::shared_ptr<const Medium> constant(Real value) {
-  Homogeneous field;
-  field.value = value;
-  field.prepare();
-  return std::make_shared<FieldMedium<Homogeneous>>(field);
-}
-
-std::shared_ptr<const Medium> linear(Real begin, Real end) {
-  Linear field;
-  field.profile = {begin, end};
-  field.prepare();
-  return std::make_shared<FieldMedium<Linear>>(field);
-}
 
 constexpr Real kLog2 = 0.6931471805599453;
 

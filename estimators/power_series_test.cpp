@@ -11,9 +11,8 @@
 #include "estimators/p_series_cumulative.h"
 #include "estimators/p_series_next_flight.h"
 #include "estimators/p_series_ratio.h"
+#include "media/built_media.h"
 #include "media/channels.h"
-#include "media/homogeneous.h"
-#include "media/linear.h"
 
 namespace nullmark {
 namespace {
@@ -22,20 +21,6 @@ namespace {
 constexpr Real kSigmas = 5.5;
 
 using Long = long double;
-
-std::shared_ptr<const Medium> constant(Real value) {
-  Homogeneous field;
-  field.value = value;
-  field.prepare();
-  return std::make_shared<FieldMedium<Homogeneous>>(field);
-}
-
-std::shared_ptr<const Medium> linear(Real begin, Real end) {
-  Linear field;
-  field.profile = {begin, end};
-  field.prepare();
-  return std::make_shared<FieldMedium<Linear>>(field);
-}
 
 constexpr Real kLog2 = 0.6931471805599453;
 

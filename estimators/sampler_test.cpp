@@ -20,12 +20,12 @@
 #include "estimators/spectral.h"
 #include "estimators/weighted_decomposition.h"
 #include "estimators/weighted_delta.h"
+#include "media/built_media.h"
 #include "media/channels.h"
 #include "media/cosine.h"
 #include "media/exponential.h"
 #include "media/homogeneous.h"
 #include "media/layers.h"
-#include "media/linear.h"
 #include "media/polynomial.h"
 #include "media/sum.h"
 
@@ -34,25 +34,6 @@ namespace {
 
 /// Statistical tests here are two-sided at 5.5 standard errors, 4e-8 each, on fixed streams.
 constexpr Real kSigmas = 5.5;
-
-template <class Field>
-std::shared_ptr<const Medium> built(Field field) {
-  if constexpr (requires { field.prepare(); }) field.prepare();
-  return std::make_shared<FieldMedium<Field>>(std::move(field));
-}
-
-std::shared_ptr<const Medium> constant(Real value) {
-  Homogeneous field;
-  field.value = value;
-  return built(field);
-}
-
-std::shared_ptr<const Medium> linear(Real begin, Real end, Real depth = 0) {
-  Linear field;
-  field.profile = {begin, end};
-  field.target_depth = depth;
-  return built(field);
-}
 
 std::shared_ptr<const Medium> rising_exponential(Real amplitude, Real rate) {
   Exponential field;

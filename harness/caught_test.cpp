@@ -8,7 +8,7 @@
 #include "estimators/planted/scenes.h"
 #include "harness/config.h"
 #include "harness/registry.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 #include "harness/verdict_json.h"
 
 namespace nullmark {
@@ -25,9 +25,7 @@ std::vector<CellRecord> run_all(std::uint64_t seed, const std::string& gate) {
       "experiments":[{{"name":"planted","include":[{}]}}]}})",
                               cells),
                   "planted.json", seed);
-  RunOptions options;
-  options.timing = false;
-  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, {});
+  return run_untimed(plan);
 }
 
 bool breaks(const VerdictRecord& verdict, std::string_view law) {
@@ -79,9 +77,7 @@ TEST(Caught, NanOnceInAMillion) {
       "rays":"single","samples_per_ray":30000000,"gate":{"enabled":false},
       "matrix":{"estimator":"planted_nan","medium":{"type":"homogeneous","extinction":1}}}]})",
                                 "nan.json");
-  RunOptions options;
-  options.timing = false;
-  const CellRecord record = run_plan(plan, {true}, {}, options, {}).at(0);
+  const CellRecord record = run_untimed(plan).at(0);
   EXPECT_EQ(record.status, Status::error);
   EXPECT_GT(record.nonfinite, 0u);
 }

@@ -8,7 +8,7 @@
 #include "harness/json_input.h"
 #include "harness/moments.h"
 #include "harness/record_examples.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 
 namespace nullmark {
 namespace {
@@ -214,10 +214,8 @@ TEST(Comparison, PairedIntervalsHoldTheTrueRatio) {
         "rays":"single","samples_per_ray":4096,"gate":{"enabled":false},
         "matrix":{"estimator":["ratio","delta"],"medium":{"type":"linear","optical_depth":1}}}]})",
                                   "test.json", static_cast<std::uint64_t>(seed));
-    RunOptions options;
-    options.timing = false;
     RunRecord run;
-    run.cells = run_plan(plan, {true, true}, {}, options, {});
+    run.cells = run_untimed(plan);
     const std::vector<RunRecord> runs = {run};
     const Contest contest = contests(runs, "delta").at(0);
     ASSERT_EQ(contest.pairings.size(), 1u);

@@ -13,7 +13,7 @@
 #include "estimators/transport/phase.h"
 #include "harness/config.h"
 #include "harness/expectation.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 #include "harness/scene.h"
 
 namespace nullmark {
@@ -21,12 +21,6 @@ namespace {
 
 Plan shipped(const std::string& name) {
   return read_configs(load_configs({std::string(NULLMARK_SOURCE_DIR) + "/configs/" + name}));
-}
-
-std::vector<CellRecord> run(const Plan& plan) {
-  RunOptions options;
-  options.timing = false;
-  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, {});
 }
 
 const CellRecord& find(const std::vector<CellRecord>& records, const std::string& experiment, const std::string& estimator) {
@@ -84,7 +78,7 @@ TEST(Configs, Seed003RelationsAreMet) {
     Plan plan = shipped(name);
     RunRecord record;
     for (Cell& cell : plan.cells) cell.gate.enabled = false;
-    record.cells = run(plan);
+    record.cells = run_untimed(plan);
     record.tables = plan.tables;
     const std::vector<Expectation> all = expectations(record);
     EXPECT_GE(all.size(), 15u);
@@ -97,7 +91,7 @@ TEST(Configs, Seed003RelationsAreMet) {
 
 /// Kozelj's Table 1: corrected within 2 % of theory at 256 x 256, as published within 4 % of the printed values at 400 x 400.
 TEST(Configs, Seed004TableIsReproducedAndCorrected) {
-  const auto records = run(shipped("seed_004_table1.json"));
+  const auto records = run_untimed(shipped("seed_004_table1.json"));
   struct Row {
     const char *published_estimator, *estimator;
     Real published, theory;
@@ -138,9 +132,7 @@ TEST(Configs, Seed000ResidualsHaveTheirExpectation) {
   Plan plan = shipped("seed_000_controls.json");
   std::vector<bool> selected;
   for (const Cell& cell : plan.cells) selected.push_back(cell.experiment == "expectation");
-  RunOptions options;
-  options.timing = false;
-  const auto records = run_plan(plan, selected, {}, options, {});
+  const auto records = run_untimed(plan, selected);
   EXPECT_EQ(records.size(), 6u);
   for (const CellRecord& record : records) {
     const ChannelRecord& channel = record.channel[0];
@@ -155,9 +147,7 @@ TEST(Configs, Seed000TreesLeaveHomogeneousMediaAlone) {
   std::vector<bool> selected;
   for (const Cell& cell : plan.cells)
     selected.push_back(cell.experiment == "procedural" && plan.media[cell.medium].field.type == "homogeneous");
-  RunOptions options;
-  options.timing = false;
-  const auto records = run_plan(plan, selected, {}, options, {});
+  const auto records = run_untimed(plan, selected);
   std::map<std::string, const CellRecord*> global;
   for (const CellRecord& record : records)
     if (record.majorant.type == "global") global[record.cell.estimator.label] = &record;
@@ -175,9 +165,10 @@ TEST(Configs, Seed000TreesLeaveHomogeneousMediaAlone) {
   EXPECT_EQ(trees, 4 * 6);
 }
 
-/// Kutz et al. 2017, Sec. 5: history-aware schemes beat the others; those that do not depend on the albedo have the tabled variances.
+/// Kutz et al. 2017, Sec. 5: history-aware schemes beat the others; those that do not depend on the albedo have the tabled
+/// variances.
 TEST(Configs, Seed003SpectralRanksTheSchemes) {
-  const auto records = run(shipped("seed_003_spectral.json"));
+  const auto records = run_untimed(shipped("seed_003_spectral.json"));
   std::map<std::string, const CellRecord*> constant;
   for (const CellRecord& record : records) {
     SCOPED_TRACE(record.cell.name);
@@ -251,9 +242,7 @@ TEST_F(RealVolumes, AGridMajorantSavesLookupsOnSmokeAndLeavesTheTransmittance) {
   std::vector<bool> selected;
   for (const Cell& cell : plan.cells)
     selected.push_back(plan.media[cell.medium].label.find("/smoke.vdb") != std::string::npos && cell.estimator.label == "ratio");
-  RunOptions options;
-  options.timing = false;
-  const auto records = run_plan(plan, selected, {}, options, {});
+  const auto records = run_untimed(plan, selected);
   std::map<std::string, std::map<std::string, const CellRecord*>> by_medium;
   for (const CellRecord& record : records) by_medium[record.medium.label][record.majorant.type] = &record;
   EXPECT_EQ(by_medium.size(), 2u);
@@ -274,9 +263,7 @@ TEST_F(RealVolumes, TreesSaveLookupsOnSmokeAndLeaveTheTransmittance) {
   std::vector<bool> selected;
   for (const Cell& cell : plan.cells)
     selected.push_back(plan.media[cell.medium].label.find("/smoke.vdb") != std::string::npos && cell.estimator.label == "ratio");
-  RunOptions options;
-  options.timing = false;
-  const auto records = run_plan(plan, selected, {}, options, {});
+  const auto records = run_untimed(plan, selected);
   ASSERT_EQ(records.size(), 13u);
   const CellRecord& global = records[0];
   EXPECT_EQ(global.majorant.type, "global");

@@ -7,7 +7,7 @@
 
 #include "harness/config.h"
 #include "harness/registry.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 
 namespace nullmark {
 namespace {
@@ -35,10 +35,7 @@ std::vector<CellRecord> run(const std::string& experiment, int threads = 0) {
       R"({"$schema":"nullmark/config/1","name":"test","seed":1,"timing":{"enabled":false},"experiments":[{"name":"cells",)" +
       experiment + "}]}";
   const Plan plan = read_config(text, "test.json");
-  RunOptions options;
-  options.threads = threads;
-  options.timing = false;
-  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, {});
+  return run_untimed(plan, {}, threads);
 }
 
 constexpr const char* kMedia = R"(

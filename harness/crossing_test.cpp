@@ -8,7 +8,7 @@
 
 #include "harness/config.h"
 #include "harness/parameter_values.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 #include "harness/scene.h"
 #include "media/majorants/tree.h"
 
@@ -19,12 +19,6 @@ Plan planned(const std::string& experiment) {
   return read_config(
       R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"cells",)" + experiment + "}]}",
       "test.json");
-}
-
-std::vector<CellRecord> run(const Plan& plan) {
-  RunOptions options;
-  options.timing = false;
-  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, {});
 }
 
 constexpr const char* kFourCells[] = {
@@ -44,7 +38,7 @@ TEST(Crossing, DrawsAreThoseOfTheory) {
   const Real ratio_error = 5.5 * std::sqrt(0.8665 / kSamples), delta_error = 5.5 * std::sqrt(37. / kSamples);
   for (const char* majorant : kFourCells)
     for (const bool rewinds : {false, true}) {
-      const auto records = run(planned(fmt::format(
+      const auto records = run_untimed(planned(fmt::format(
           R"("rays":"single","samples_per_ray":{},"matrix":{{"estimator":["ratio","delta"],
              "medium":{{"type":"linear","optical_depth":0.6931471805599453}},"majorant":{}}})",
           kSamples, with_rule(majorant, rewinds ? "rewind" : "carry"))));
@@ -68,7 +62,7 @@ TEST(Crossing, AForcedCutOfAHomogeneousMediumIsWasted) {
   constexpr std::uint64_t kSamples = 1'000'000;
   for (const char* structure : {"kd_tree", "octree"})
     for (const char* rule : {"carry", "rewind"}) {
-      const auto records = run(planned(fmt::format(
+      const auto records = run_untimed(planned(fmt::format(
           R"("rays":"single","samples_per_ray":{},"matrix":{{"estimator":["ratio","delta"],"medium":{{"type":"homogeneous","extinction":1}},
              "majorant":{{"type":"{}","max_depth":4,"forced_depth":[0,1],"crossing":"{}"}}}})",
           kSamples, structure, rule)));
@@ -100,7 +94,7 @@ TEST(Crossing, CostPredictsWhatThinWalksSpend) {
                    "medium":[{"type":"fractal_noise","peak":0.02,"sharpness":4},{"type":"gaussian_bump","amplitude":0.02,"hi":[2,1,1]}],
                    "majorant":[{"type":"kd_tree","resolution":32,"looseness":10000,"crossing":"rewind"},
                                {"type":"octree","max_depth":5,"looseness":10000,"crossing":"rewind"}]})");
-  for (const CellRecord& record : run(plan)) {
+  for (const CellRecord& record : run_untimed(plan)) {
     const auto structure = make_majorant(record.majorant)->build(build_medium(record.medium).medium);
     const auto& tree = dynamic_cast<const TreeMajorant&>(*structure);
     EXPECT_GT(tree.size().cells, 1u) << record.cell.name;
@@ -124,7 +118,7 @@ TEST(Crossing, NoPartitionAndNoRuleChangesTheLaw) {
                                {"type":"kd_tree","resolution":16,"forced_depth":4,"crossing":["carry","rewind"]},
                                {"type":"octree","max_depth":4,"forced_depth":2,"crossing":["carry","rewind"]}]})");
   std::size_t passed = 0;
-  const auto records = run(plan);
+  const auto records = run_untimed(plan);
   for (const CellRecord& record : records) {
     ASSERT_EQ(record.status, Status::ok) << record.cell.name << record.reason;
     ASSERT_TRUE(record.verdict) << record.cell.name;

@@ -16,7 +16,7 @@
 #include "harness/calibration.h"
 #include "harness/config.h"
 #include "harness/gate.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 #include "harness/sampling.h"
 #include "harness/verdict.h"
 
@@ -581,9 +581,7 @@ TEST(FalseAlarms, TheProgramsOwnCells) {
           R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"verdict":{{"alpha":0.1}},"experiments":[{},{}]}})",
           bounded, unbounded),
       "false_alarms.json");
-  RunOptions options;
-  options.timing = false;
-  const std::vector<CellRecord> records = run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, {});
+  const std::vector<CellRecord> records = run_untimed(plan);
 
   constexpr Real kAlone = 1e-2;  // the level of a cell judged alone, at which alarms are frequent enough to be counted
   std::uint64_t cells = 0, fails = 0, passes = 0, means = 0, mean_alarms = 0, lookups = 0, lookup_alarms = 0;

@@ -11,7 +11,7 @@
 #include "harness/config.h"
 #include "harness/image.h"
 #include "harness/results_json.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 #include "harness/transport_json.h"
 
 namespace nullmark {
@@ -22,9 +22,7 @@ std::vector<CellRecord> run(const std::string& experiment) {
       R"({"$schema":"nullmark/config/1","name":"test","timing":{"enabled":false},"experiments":[{"name":"cells",)" + experiment +
       "}]}";
   const Plan plan = read_config(text, "test.json");
-  RunOptions options;
-  options.timing = false;
-  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, {});
+  return run_untimed(plan);
 }
 
 const LawRecord* law(const CellRecord& record, const std::string& name) {

@@ -16,26 +16,19 @@
 #include "harness/config.h"
 #include "harness/estimator_template.h"
 #include "harness/file_io.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 #include "harness/stability.h"
-#include "media/homogeneous.h"
+#include "media/built_media.h"
 
 namespace nullmark {
 namespace {
 
-std::shared_ptr<const Medium> constant(Real extinction) {
-  Homogeneous field;
-  field.value = extinction;
-  return std::make_shared<FieldMedium<Homogeneous>>(field);
-}
-
-RunRecord run_of(const Plan& plan, const std::function<bool(const Cell&)>& wanted = [](const Cell&) { return true; }) {
+RunRecord run_of(
+    const Plan& plan, const std::function<bool(const Cell&)>& wanted = [](const Cell&) { return true; }) {
   std::vector<bool> selected;
   for (const Cell& cell : plan.cells) selected.push_back(wanted(cell));
-  RunOptions options;
-  options.timing = false;
   RunRecord run;
-  run.cells = run_plan(plan, selected, {}, options, {});
+  run.cells = run_untimed(plan, selected);
   return run;
 }
 
@@ -138,7 +131,8 @@ TEST(HardCases, LookupsThatAreNotStatedAreBudgeted) {
   EXPECT_EQ(record.verdict->unbiased, Outcome::inconclusive);
 }
 
-/// The same volume ten thousand times smaller and a million times larger, from real files.  Voxels of 1e-6 OpenVDB itself refuses.
+/// The same volume ten thousand times smaller and a million times larger, from real files.  Voxels of 1e-6 OpenVDB itself
+/// refuses.
 TEST(HardCases, VoxelsOfAnySizeGiveTheSameTransmittance) {
   openvdb::initialize();
   const auto records = [](double voxel) {
@@ -147,17 +141,16 @@ TEST(HardCases, VoxelsOfAnySizeGiveTheSameTransmittance) {
     grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
     for (int i = 0; i < 20; ++i)
       for (int j = 0; j < 20; ++j)
-        for (int k = 0; k < 20; ++k)
-          grid->tree().setValue({i - 7, j, k}, static_cast<float>((i * 7 % 5 + j % 3 + k % 2) / 64.));
+        for (int k = 0; k < 20; ++k) grid->tree().setValue({i - 7, j, k}, static_cast<float>((i * 7 % 5 + j % 3 + k % 2) / 64.));
     const std::string file = fmt::format("{}nullmark_voxels_{}_{}.vdb", ::testing::TempDir(), ::getpid(), voxel);
     openvdb::io::File(file).write({grid});
-    const RunRecord run = run_of(read_config(
-        fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e",
+    const RunRecord run = run_of(
+        read_config(fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e",
             "rays":{{"type":"orthographic","width":4,"height":4,"axis":"y"}},"samples_per_ray":4096,"gate":{{"epsilon":0.05,"max_samples_per_ray":1000000}},
             "matrix":{{"estimator":["regular","ratio","delta"],"majorant":["global",{{"type":"grid","resolution":4}}],
                        "medium":{{"type":"vdb","file":"{}","extinction_per_value":{}}}}}}}]}})",
-                    file, 1 / voxel),
-        "test.json"));
+                                file, 1 / voxel),
+                    "test.json"));
     std::filesystem::remove(file);
     return run.cells;
   };
@@ -179,9 +172,8 @@ TEST(HardCases, VoxelsOfAnySizeGiveTheSameTransmittance) {
 /// The means that hard cases are held to, against arithmetic in long double.
 TEST(HardCases, ReferencesAgreeWithLongDouble) {
   const Plan plan = read_config(read_file(NULLMARK_SOURCE_DIR "/configs/hard_cases.json"), "hard_cases.json");
-  const RunRecord run = run_of(plan, [](const Cell& cell) {
-    return cell.estimator.type == "closed_form" || cell.estimator.type == "regular";
-  });
+  const RunRecord run =
+      run_of(plan, [](const Cell& cell) { return cell.estimator.type == "closed_form" || cell.estimator.type == "regular"; });
   const auto depth_of = [](const CellRecord& record) -> std::optional<long double> {
     const Component& field = record.medium.field;
     if (record.cell.experiment == "rays" || record.cell.experiment == "negative_zero") return std::nullopt;
@@ -189,7 +181,8 @@ TEST(HardCases, ReferencesAgreeWithLongDouble) {
     if (const auto depth = field.values.find("optical_depth"); depth != field.values.end() && record.medium.spectrum.empty())
       if (const Real value = std::get<Real>(depth->second); value > 0) return value;
     if (record.cell.experiment != "slab") return std::nullopt;
-    const auto values = std::get<std::vector<Real>>(field.values.at("values")), edges = std::get<std::vector<Real>>(field.values.at("edges"));
+    const auto values = std::get<std::vector<Real>>(field.values.at("values")),
+               edges = std::get<std::vector<Real>>(field.values.at("edges"));
     const long double inside = static_cast<long double>(edges[1]) - edges[0];
     return values[0] * (1 - inside) + values[1] * inside;
   };
@@ -205,7 +198,8 @@ TEST(HardCases, ReferencesAgreeWithLongDouble) {
     EXPECT_NEAR(*record.channel[0].mean, exact, allowed) << record.cell.name;
     ++held[record.cell.experiment];
   }
-  for (const char* experiment : {"depth", "depth_in_cells", "depth_million", "looseness", "looseness_million", "violated", "denormal", "slab", "far", "size"})
+  for (const char* experiment : {"depth", "depth_in_cells", "depth_million", "looseness", "looseness_million", "violated",
+                                 "denormal", "slab", "far", "size"})
     EXPECT_GT(held[experiment], 0) << experiment;
 }
 

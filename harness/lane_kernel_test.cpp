@@ -13,11 +13,11 @@
 #include "estimators/residual_ratio.h"
 #include "estimators/weighted_delta.h"
 #include "harness/estimator_template.h"
+#include "media/built_media.h"
 #include "media/cosine.h"
 #include "media/exponential_cube.h"
 #include "media/gaussian_bump.h"
 #include "media/gaussian_hole.h"
-#include "media/homogeneous.h"
 #include "media/layers.h"
 #include "media/majorants/global.h"
 #include "media/majorants/grid.h"
@@ -40,12 +40,6 @@ struct Case {
   std::shared_ptr<const MajorantStructure> majorant;
   Ray world;
 };
-
-template <class Field>
-std::shared_ptr<const Medium> built(Field field) {
-  if constexpr (requires { field.prepare(); }) field.prepare();
-  return std::make_shared<FieldMedium<Field>>(std::move(field));
-}
 
 /// Voxels 0 to 31 on each axis, a smooth blob with a vacuum around it.
 std::shared_ptr<const Medium> volume() {
@@ -79,8 +73,6 @@ std::vector<Case> cases() {
   Cosine cosine;
   cosine.target_depth = 4;
   ExponentialCube cube;
-  Homogeneous constant;
-  constant.value = 3;
   const Ray slanted{{0.02, 0.1, 0.3}, Vec3(1, 0.5, 0.25).normalized(), 0, kInfinity};
   std::vector<Case> all;
   const auto add = [&](const std::string& name, std::shared_ptr<const Medium> medium) {
@@ -92,7 +84,7 @@ std::vector<Case> cases() {
     with("grid", std::make_shared<GridMajorant>(*medium, std::array{7, 3, 5}, 1));
     with("rewind", std::make_shared<GridMajorant>(*medium, std::array{7, 3, 5}, 1.2, Crossing::rewind));
   };
-  add("constant", built(constant));
+  add("constant", constant(3));
   add("bump", built(bump));
   add("hole", built(hole));
   add("cosine", built(cosine));

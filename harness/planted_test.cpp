@@ -15,7 +15,7 @@
 #include "harness/config.h"
 #include "harness/json_input.h"
 #include "harness/parameter_values.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 #include "harness/scene.h"
 #include "harness/schema.h"
 
@@ -36,9 +36,7 @@ std::vector<CellRecord> run(const std::string& samples, const std::string& matri
       {{"name":"planted","samples_per_ray":{},"matrix":{{{}}}}}]}})",
                                             samples, matrix),
                                 "planted.json");
-  RunOptions options;
-  options.timing = false;
-  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, {});
+  return run_untimed(plan);
 }
 
 CellRecord run(const PlantedScene& scene) {

@@ -1,13 +1,13 @@
 #include "harness/ray_memory.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <set>
 
 #include "harness/moments.h"
 #include "harness/parameter_values.h"
 #include "harness/sampling.h"
+#include "media/machine_memory.h"
 
 namespace nullmark {
 namespace {
@@ -24,7 +24,7 @@ constexpr Real kGigabyte = 1e9;
 }  // namespace
 
 void expect_rays_fit(const Plan& plan, const std::function<bool(std::size_t)>& wanted) {
-  const Real machine = static_cast<Real>(::sysconf(_SC_PHYS_PAGES)) * static_cast<Real>(::sysconf(_SC_PAGESIZE));
+  const Real machine = static_cast<Real>(machine_memory());
   std::set<std::array<std::size_t, 2>> built;
   Real kept = 0;
   for (std::size_t i = 0; i < plan.cells.size(); ++i) {

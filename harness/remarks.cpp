@@ -28,9 +28,10 @@ std::string measured_by(const RunRecord& run) { return short_version(run.provena
 std::string this_version() { return short_version(make_provenance({}, std::chrono::system_clock::now())); }
 
 std::optional<std::string> version_remark(const RunRecord& run) {
-  if (run.provenance.count("version") == 0 || measured_by(run) == this_version()) return std::nullopt;
-  return fmt::format("measured by {}, read by {}; run the configuration again where versions matter", measured_by(run),
-                     this_version());
+  if (run.provenance.count("version") == 0) return std::nullopt;
+  const std::string measured = measured_by(run), read = this_version();
+  if (measured == read) return std::nullopt;
+  return fmt::format("measured by {}, read by {}; run the configuration again where versions matter", measured, read);
 }
 
 }  // namespace nullmark

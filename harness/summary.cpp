@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "harness/findings_text.h"
 #include "harness/json_input.h"
@@ -94,28 +95,20 @@ std::string order_line(const OrderFit& fit) {
 }
 
 /// The configuration in the results names every cell, whatever a filter, a shard or a time budget left of them.
-std::size_t configured_cells(const RunRecord& run) {
-  const Json config = Json::parse(run.config_text, nullptr, false);
-  std::size_t cells = 0;
-  if (config.is_object() && config.contains("experiments"))
-    for (const Json& experiment : config["experiments"])
-      if (experiment.is_object() && experiment.contains("include")) cells += experiment["include"].size();
-  return cells;
-}
-
-std::size_t disabled_cells(const RunRecord& run) {
+std::size_t configured_cells(const RunRecord& run, const std::function<bool(const Json&)>& counts) {
   const Json config = Json::parse(run.config_text, nullptr, false);
   std::size_t cells = 0;
   if (!config.is_object() || !config.contains("experiments")) return cells;
-  for (const Json& experiment : config["experiments"]) {
-    if (!experiment.is_object() || !experiment.contains("include")) continue;
-    for (const Json& cell : experiment["include"]) {
-      if (!cell.is_object() || !cell.contains("gate")) continue;
-      const Json& gate = cell["gate"];
-      cells += gate.is_object() && gate.contains("enabled") && gate["enabled"] == false;
-    }
-  }
+  for (const Json& experiment : config["experiments"])
+    if (experiment.is_object() && experiment.contains("include"))
+      cells += static_cast<std::size_t>(std::count_if(experiment["include"].begin(), experiment["include"].end(), counts));
   return cells;
+}
+
+bool disables_verdict(const Json& cell) {
+  if (!cell.is_object() || !cell.contains("gate")) return false;
+  const Json& gate = cell["gate"];
+  return gate.is_object() && gate.contains("enabled") && gate["enabled"] == false;
 }
 
 std::size_t met(const std::vector<Expectation>& all) {
@@ -128,7 +121,7 @@ std::string families(const RunRecord& run) {
       return fmt::format(
           "at most {:g} of all runs show even one false FAIL among {} mean tests (and the same among {} of lookups)",
           record.verdict->alpha, record.verdict->family, record.verdict->lookups_family);
-  const std::size_t off = disabled_cells(run), cells = run.cells.size();
+  const std::size_t off = configured_cells(run, disables_verdict), cells = run.cells.size();
   if (off == 0) return "no cell was judged";
   return fmt::format("no cell was judged: the configuration disables the verdict in {} cells",
                      off == cells ? fmt::format("all {}", cells) : fmt::format("{} of {}", off, cells));
@@ -175,7 +168,7 @@ Summary summarise(RunRecord& run) {
     }
   }
   for (const CellRecord& record : run.cells) summary.never_started += record.status == Status::not_run;
-  const std::size_t configured = configured_cells(run);
+  const std::size_t configured = configured_cells(run, [](const Json&) { return true; });
   if (configured > run.cells.size()) summary.never_started += configured - run.cells.size();
   summary.orders = fit_orders(run.cells);
   const bool order_failed =

@@ -1,8 +1,8 @@
 #include "media/brick_grid.h"
 
-#include <unistd.h>
-
 #include <bit>
+
+#include "media/machine_memory.h"
 
 namespace nullmark {
 
@@ -76,7 +76,7 @@ void BrickGrid::allocate(std::int64_t bricks) {
     throw std::length_error("voxel values of " + std::to_string(bytes >> 20) + " MiB exceed the limit of " +
                             std::to_string(kMaxValueBytes >> 20) + " MiB");
   // Beyond it the system would end the program, here or later, without a word.
-  const std::int64_t machine = std::int64_t{::sysconf(_SC_PHYS_PAGES)} * ::sysconf(_SC_PAGESIZE);
+  const std::int64_t machine = static_cast<std::int64_t>(machine_memory());
   if (bytes > machine)
     throw std::length_error("voxel values of " + std::to_string(bytes >> 20) + " MiB exceed this machine's memory of " +
                             std::to_string(machine >> 20) + " MiB");

@@ -5,6 +5,7 @@
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <random>
 
+#include "media/built_media.h"
 #include "media/cosine.h"
 #include "media/exponential_cube.h"
 #include "media/fractal_noise.h"
@@ -15,16 +16,10 @@ namespace nullmark {
 namespace {
 
 template <class Field>
-std::shared_ptr<const Medium> grey(Field field) {
-  field.prepare();
-  return std::make_shared<FieldMedium<Field>>(std::move(field));
-}
-
-template <class Field>
 std::shared_ptr<const Medium> in_box(const Vec3& lo, const Vec3& hi, Field field = {}) {
   field.lo = lo;
   field.hi = hi;
-  return grey(std::move(field));
+  return built(std::move(field));
 }
 
 /// A homogeneous medium in another frame.
@@ -138,7 +133,7 @@ void expect_depths(const Medium& medium, std::mt19937& random) {
 
 TEST(Spectral, ScalesTheGreyMedium) {
   std::mt19937 random(1);
-  const auto base = grey(Cosine{});
+  const auto base = built(Cosine{});
   const std::vector<Real> spectrum = {1, 0, 100, 0.25};
   const Spectral medium(base, spectrum);
   ASSERT_EQ(medium.channels(), 4);
@@ -152,19 +147,19 @@ TEST(Spectral, ScalesTheGreyMedium) {
   expect_bounds(medium, random);
   expect_depths(medium, random);
   EXPECT_FALSE(medium.polynomial_degree());
-  EXPECT_EQ(Spectral(grey(Linear{}), {1, 2}).polynomial_degree(), 1);
-  EXPECT_FALSE(Spectral(grey(FractalNoise{}), {1, 2}).optical_depth({{0, 0.5, 0.5}, {1, 0, 0}, 0, 1}));
+  EXPECT_EQ(Spectral(built(Linear{}), {1, 2}).polynomial_degree(), 1);
+  EXPECT_FALSE(Spectral(built(FractalNoise{}), {1, 2}).optical_depth({{0, 0.5, 0.5}, {1, 0, 0}, 0, 1}));
 }
 
 TEST(Spectral, UnboundedTimesZeroIsZero) {
-  const Spectral medium(grey(ExponentialCube{}), {0, 2});
+  const Spectral medium(built(ExponentialCube{}), {0, 2});
   const Extrema e = medium.extrema(medium.bounds());
   EXPECT_EQ(e.maximum[0], 0);
   EXPECT_EQ(e.maximum[1], kInfinity);
 }
 
 TEST(Spectral, RefusesWhatIsNoSpectrum) {
-  const auto base = grey(Linear{});
+  const auto base = built(Linear{});
   EXPECT_THROW(Spectral(base, {}), ParameterError);
   EXPECT_THROW(Spectral(base, std::vector<Real>(17, 1)), ParameterError);
   EXPECT_NO_THROW(Spectral(base, std::vector<Real>(16, 1)));
@@ -200,7 +195,7 @@ TEST(PerChannel, BoundsAndDepthsHold) {
   expect_bounds(*medium, random);
   expect_depths(*medium, random);
   EXPECT_FALSE(medium->polynomial_degree());
-  EXPECT_EQ(PerChannel({grey(Linear{}), grey(Homogeneous{})}).polynomial_degree(), 1);
+  EXPECT_EQ(PerChannel({built(Linear{}), built(Homogeneous{})}).polynomial_degree(), 1);
 }
 
 TEST(PerChannel, PartlyCoveredBoxesReachZero) {
@@ -219,7 +214,7 @@ TEST(PerChannel, PartlyCoveredBoxesReachZero) {
 
 TEST(PerChannel, NeverLooksUpOutsideAComponent) {
   std::mt19937 random(4);
-  const PerChannel medium({grey(Homogeneous{}), std::make_shared<Strict>()});
+  const PerChannel medium({built(Homogeneous{}), std::make_shared<Strict>()});
   std::vector<Vec3> points;
   for (int i = 0; i < 1000; ++i) points.push_back(point(random, medium.bounds()));
   std::vector<Real> out;
@@ -228,7 +223,7 @@ TEST(PerChannel, NeverLooksUpOutsideAComponent) {
 }
 
 TEST(Channels, ContentHashesPassThrough) {
-  const auto plain = grey(Homogeneous{});
+  const auto plain = built(Homogeneous{});
   const std::shared_ptr<const Medium> file = std::make_shared<Strict>();
   EXPECT_EQ(PerChannel({plain, plain}).content_hash(), 0u);
   EXPECT_NE(PerChannel({plain, file}).content_hash(), 0u);
@@ -245,7 +240,7 @@ TEST(PerChannel, KnotsHoldEntriesAndExits) {
 }
 
 TEST(PerChannel, RefusesWhatDoesNotFit) {
-  const auto one = grey(Homogeneous{});
+  const auto one = built(Homogeneous{});
   EXPECT_THROW(PerChannel({}), ParameterError);
   EXPECT_THROW(PerChannel(std::vector<std::shared_ptr<const Medium>>(17, one)), ParameterError);
   EXPECT_THROW(PerChannel({one, std::make_shared<Moved>()}), ParameterError);

@@ -21,6 +21,7 @@
 #include <string_view>
 
 #include "media/flat_volume.h"
+#include "media/machine_memory.h"
 #include "media/registry.h"
 #include "media/vdb_process.h"
 
@@ -53,7 +54,7 @@ struct Limits {
 /// nodes have two bits of masks in the file for every eight bytes of memory.
 Limits limits_of(std::uint64_t file_size) {
   const std::uint64_t cpu = 3 + file_size / 1'000'000;
-  const auto machine = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::getpagesize());
+  const std::uint64_t machine = machine_memory();
   constexpr std::uint64_t kLeast = std::uint64_t{1} << 30;
   return {cpu, 60 + 10 * cpu, std::min(machine, kLeast + 64 * std::min(file_size, machine))};
 }

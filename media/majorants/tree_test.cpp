@@ -8,13 +8,12 @@
 #include <functional>
 #include <random>
 
+#include "media/built_media.h"
 #include "media/channels.h"
 #include "media/checkerboard.h"
 #include "media/exponential_cube.h"
 #include "media/fractal_noise.h"
 #include "media/gaussian_bump.h"
-#include "media/homogeneous.h"
-#include "media/linear.h"
 #include "media/majorants/kd_tree.h"
 #include "media/majorants/octree.h"
 
@@ -38,36 +37,24 @@ class Placed final : public Medium {
   Affine to_local_;
 };
 
-template <class Field, class... Values>
-MediumPointer made(Field field) {
-  if constexpr (requires { field.prepare(); }) field.prepare();
-  return std::make_shared<FieldMedium<Field>>(std::move(field));
-}
-
 MediumPointer bump(Real amplitude) {
   GaussianBump field;
   field.profile.amplitude = amplitude;
-  return made(field);
+  return built(field);
 }
 
 MediumPointer noise(Real peak) {
   FractalNoise field;
   field.peak = peak;
   field.sharpness = 4;
-  return made(field);
+  return built(field);
 }
 
 MediumPointer board(Real extinction, const std::array<int, 3>& cells = {3, 3, 3}) {
   Checkerboard field;
   field.even = extinction;
   field.cells = cells;
-  return made(field);
-}
-
-MediumPointer homogeneous(Real extinction) {
-  Homogeneous field;
-  field.value = extinction;
-  return made(field);
+  return built(field);
 }
 
 Affine sheared() {
@@ -79,7 +66,7 @@ Affine sheared() {
 
 /// The second checkerboard jumps at planes of the lattice that `trees` has of 13 x 7 x 2 cells: segments end on either side.
 std::vector<MediumPointer> media() {
-  return {made(Linear{}),
+  return {built(Linear{}),
           bump(60),
           noise(200),
           board(50),
@@ -201,9 +188,8 @@ TEST(TreeMajorant, HomogeneousMediaAreNeverCut) {
   for (const Real extinction : {0., 1e-3, 1., 15.1, 1e3, 1e9})
     for (const Real looseness : {1., 5., 1 / 3.})
       for (const Affine& frame : {Affine(Affine::Identity()), sheared()})
-        for (const MediumPointer& medium :
-             {homogeneous(extinction),
-              MediumPointer(std::make_shared<Spectral>(homogeneous(extinction), std::vector<Real>{1, 0.3, 2}))}) {
+        for (const MediumPointer& medium : {constant(extinction), MediumPointer(std::make_shared<Spectral>(
+                                                                      constant(extinction), std::vector<Real>{1, 0.3, 2}))}) {
           const Placed placed(medium, frame);
           EXPECT_EQ(KdTreeMajorant(placed, {.resolution = {16, 16, 16}}, looseness).size().cells, 1u);
           EXPECT_EQ(KdTreeMajorant(placed, {.resolution = {7, 3, 5}, .lookahead = 9}, looseness).size().nodes, 1u);
@@ -261,7 +247,7 @@ TEST(TreeMajorant, SegmentsTellTheCrossingRule) {
 }
 
 TEST(TreeMajorant, AnUnboundedMediumNeedsAPrescribedRate) {
-  const MediumPointer cube = made(AlongAxis<ExponentialCubeProfile>{});
+  const MediumPointer cube = built(AlongAxis<ExponentialCubeProfile>{});
   EXPECT_THROW(KdTreeMajorant(*cube, {}, 1), ParameterError);
   EXPECT_THROW(OctreeMajorant(*cube, {}, 1), ParameterError);
 }
