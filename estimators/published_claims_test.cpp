@@ -3,20 +3,17 @@
 #include <gtest/gtest.h>
 
 #include "harness/config.h"
-#include "harness/run.h"
+#include "harness/run_untimed.h"
 
 namespace nullmark {
 namespace {
 
 std::vector<CellRecord> run_of(const std::string& estimator, const std::string& medium, std::uint64_t samples) {
-  const Plan plan = read_config(
+  return run_untimed(read_config(
       R"({"$schema":"nullmark/config/1","name":"t","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",)"
       R"("samples_per_ray":)" + std::to_string(samples) + R"(,"gate":{"enabled":false},"matrix":{"estimator":)" + estimator +
           R"(,"medium":)" + medium + "}}]}",
-      "t.json");
-  RunOptions options;
-  options.timing = false;
-  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, {});
+      "t.json"));
 }
 
 /// The march of one step and all differences make T: E e^{-v(o)} + sum_n E D_n, whose levels beyond 10 are below 1e-9 here.

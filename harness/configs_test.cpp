@@ -120,8 +120,8 @@ TEST(Configs, EveryClaimOfTheListIsPutToTheTest) {
   const Plan claims = shipped("claims");
   std::set<std::string> ids;
   for (const PublishedClaim& claim : claims.claims) ids.insert(claim.id);
-  std::vector<std::string> listed = {"004-1", "004-2", "004-3", "004-4", "004-5", "004-6",
-                                     "003-1", "003-2", "003-3", "000-1", "000-2", "000-3"};
+  std::vector<std::string> listed = {"S004-1", "S004-2", "S004-3", "S004-4", "S004-5", "S004-6",
+                                     "S003-1", "S003-2", "S003-3", "S000-1", "S000-2", "S000-3"};
   // The list has no 35.
   for (int i = 1; i <= 50; ++i)
     if (i != 35) listed.push_back(fmt::format("C{:02}", i));

@@ -67,7 +67,7 @@ class Comparer {
     }
     if (is_rounding(*record, of, *value)) return exactly(*value);
     if (*error > kLargestRelativeError * std::abs(*value) && of.find("variance") != std::string::npos) {
-      reason = fmt::format("heavy tails: the sample {} is known to {:.0f} % only", of, 100 * *error / std::abs(*value));
+      reason = fmt::format("heavy tails: the error of the sample {} is {:.0f} % of it", of, 100 * *error / std::abs(*value));
       return std::nullopt;
     }
     return Interval{*value, *value - deviations_ * *error, *value + deviations_ * *error};
@@ -190,6 +190,8 @@ std::vector<ClaimFinding> findings(const RunRecord& run) {
     finding.outcome = Comparer::joint(finding.parts);
     all.push_back(std::move(finding));
   }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const ClaimFinding& a, const ClaimFinding& b) { return a.claim->id < b.claim->id; });
   return all;
 }
 

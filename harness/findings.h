@@ -36,7 +36,7 @@ struct ClaimFinding {
 /// Chance that even one of a run's comparisons ends in a word that is false, where sums of samples are normal.
 inline constexpr Real kFindingsLevel = 1e-3;
 
-/// Puts every claim of a run to the test.  Measured numbers have intervals so wide that all of them hold together with probability
+/// Puts every claim of a run to the test, in the order of their ids.  Measured numbers have intervals so wide that all of them hold together with probability
 /// 1 - kFindingsLevel (Bonferroni); a comparison is reproduced where both whole intervals bear it out, refuted where none of them
 /// does, and open otherwise.  A part is reproduced where all its cells are, refuted where one is; a claim likewise by its parts.
 /// `unbiased` parts go by the verdicts of cells, which summarise() derives.  Intervals of measured variances rest on the sample

@@ -345,6 +345,18 @@ class PageTest(unittest.TestCase):
 
     # 3: the plots have data
 
+    def test_28_claims_show_their_verdicts(self):
+        claims = self.js("return JSON.parse(document.getElementById('data').textContent).claims")
+        if not claims:
+            self.skipTest("the results have no claims")
+        rows = self.browser.find_elements(By.CSS_SELECTOR, "#claims tbody tr")
+        self.assertEqual(len(rows), len(claims))
+        for row, claim in zip(rows, claims):
+            text = row.text
+            for expected in [claim["id"], claim["finding"], claim["claim"], claim["source"]] + [part["figures"] for part in claim["parts"]]:
+                self.assertIn(expected, text)
+        self.detail = f"{len(claims)} claims"
+
     def test_30_every_plot_has_data(self):
         plots = self.draw_all()
         for plot in plots:

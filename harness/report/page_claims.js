@@ -26,6 +26,8 @@ function claimFigures(claim) {
 
 function buildClaims(body) {
   const rows = report.claims.map((claim) => [claim.id, findingBadge(claim.finding), claimText(claim), claimFigures(claim)]);
-  body.append(findingTotals(), plainTable(["claim", "verdict", "what is claimed, and where", "what was measured"], rows));
+  const table = plainTable(["claim", "verdict", "what is claimed, and where", "what was measured"], rows);
+  table.classList.add("claims");
+  body.append(findingTotals(), table);
   return () => {};
 }
