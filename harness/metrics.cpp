@@ -39,11 +39,6 @@ std::optional<Real> weighted_cost(const std::optional<Real>& lookups, const std:
   return lookups && variance ? std::optional(*lookups * (1 + *variance)) : std::nullopt;
 }
 
-std::optional<Real> best_variance(const CellRecord& record, std::size_t channel) {
-  const ChannelRecord& of = record.channel[channel];
-  return of.variance_theory ? of.variance_theory : of.variance;
-}
-
 }  // namespace
 
 const std::vector<std::string>& metric_names() {
@@ -96,14 +91,18 @@ std::optional<Real> metric_theory(const CellRecord& record, std::string_view nam
   return std::nullopt;
 }
 
+const std::optional<Real>& best_variance(const ChannelRecord& channel) {
+  return channel.variance_theory ? channel.variance_theory : channel.variance;
+}
+
 std::optional<Real> variance_x_lookups(const CellRecord& record, std::size_t channel) {
-  const std::optional<Real> variance = best_variance(record, channel);
+  const std::optional<Real>& variance = best_variance(record.channel[channel]);
   if (!variance || !record.lookups_per_sample) return std::nullopt;
   return *variance * *record.lookups_per_sample;
 }
 
 std::optional<Real> variance_x_ns(const CellRecord& record, std::size_t channel) {
-  const std::optional<Real> variance = best_variance(record, channel);
+  const std::optional<Real>& variance = best_variance(record.channel[channel]);
   if (!variance || !record.time) return std::nullopt;
   return *variance * record.time->ns_per_sample;
 }

@@ -20,6 +20,9 @@ const std::vector<std::string>& metric_names();
 std::optional<Real> metric(const CellRecord& record, std::string_view name);
 std::optional<Real> metric_theory(const CellRecord& record, std::string_view name);
 
+/// Of a sample: the analytic one where known, else as measured.
+const std::optional<Real>& best_variance(const ChannelRecord& channel);
+
 /// variance x lookups and variance x ns: lower is better.  Variance is the analytic one where known.
 std::optional<Real> variance_x_lookups(const CellRecord& record, std::size_t channel);
 std::optional<Real> variance_x_ns(const CellRecord& record, std::size_t channel);
