@@ -13,9 +13,9 @@ namespace nullmark {
 ///   minimum, average, middle, maximum   of the segment's bounds (one segment: of the medium; a grid: of each super-voxel)
 ///   medium_average                      over the whole medium
 ///   ray_average                         tau/d, from the medium's own closed form or exact traversal
-///   gamma                               min + mubr (gamma^{1/(D mubr)} - 1), cut to [min, average], with mubr = max(max - min,
-///   floor) and D
-///                                       the super-voxel's diagonal [Novák et al. 2014, Sec. 5.1; derived from its purpose]
+///   gamma                               min + mubr (gamma^{1/(D mubr)} - 1), cut to [min, average], with the super-voxel's
+///                                       diagonal D and mubr = max(max - min, floor) [Novák et al. 2014, Sec. 5.1; derived
+///                                       from its purpose]
 ///   given                               `value`
 ///   linear, exponential                 from `value` at the ray's begin to `value_end` at its end
 struct ControlChoice {
@@ -60,8 +60,8 @@ struct Control {
        growth = 0;  ///< profile: first + growth s, or first e^{growth s}, s = (t - begin)/length
   int channels = 1;
   Value depth;  ///< tau_c over the ray
-  /// int max(mu_c, mu_max - mu_c - 2 mubr), at most its largest channel's: with |w| = |1 - (mu - mu_c)/mubr| the residual's weight
-  /// has E|W| <= e^growth_depth [Poisson product].
+  /// int max(mu_c, mu_max - mu_c - 2 mubr), at most its largest channel's: with |w| = |1 - (mu - mu_c)/mubr| the residual's
+  /// weight has E|W| <= e^growth_depth [Poisson product].
   Real growth_depth = 0;
 
   template <class Distance>
@@ -92,6 +92,26 @@ struct Control {
       return profile(t);
   }
 };
+
+/// What a control that is no profile is in a segment.
+template <class Value>
+Value constant_control(const ControlChoice& choice, const Passage<Value>& ray, const Segment& segment, const Value& low,
+                       const Value& high, const Value& average) {
+  if (choice.kind == "average") return average;
+  if (choice.kind == "middle") return (low + high) / 2;
+  if (choice.kind == "maximum") return high;
+  if (choice.kind == "medium_average") return load<Value>(ray.medium.average.data(), ray.channels);
+  if (choice.kind == "ray_average") return *ray.exact_depth / ray.length();
+  if (choice.kind == "given") return ray.value(choice.value);
+  if (choice.kind != "gamma") return low;
+  Value constant = low;
+  for (int c = 0; c < ray.channels; ++c) {
+    const Real rate = std::max(channel(high, c) - channel(low, c), ControlChoice::kGammaRateFloor);
+    const Real raised = channel(low, c) + rate * std::expm1(std::log(choice.gamma) / (segment.diagonal * rate));
+    channel(constant, c) = std::clamp(raised, channel(low, c), std::max(channel(low, c), channel(average, c)));
+  }
+  return constant;
+}
 
 /// Control and residual rate of every segment of a ray.
 template <class Value>
@@ -129,20 +149,7 @@ void prepare_control(const ControlChoice& choice, const Passage<Value>& ray, Con
         channel(most, c) = std::max(channel(a, c), channel(b, c));
       }
     } else {
-      Value constant = low;
-      if (choice.kind == "average") constant = average;
-      if (choice.kind == "middle") constant = (low + high) / 2;
-      if (choice.kind == "maximum") constant = high;
-      if (choice.kind == "medium_average") constant = value(ray.medium.average);
-      if (choice.kind == "ray_average") constant = *ray.exact_depth / ray.length();
-      if (choice.kind == "given") constant = ray.value(choice.value);
-      if (choice.kind == "gamma") {
-        for (int c = 0; c < ray.channels; ++c) {
-          const Real rate = std::max(channel(high, c) - channel(low, c), ControlChoice::kGammaRateFloor);
-          const Real raised = channel(low, c) + rate * std::expm1(std::log(choice.gamma) / (segment.diagonal * rate));
-          channel(constant, c) = std::clamp(raised, channel(low, c), std::max(channel(low, c), channel(average, c)));
-        }
-      }
+      const Value constant = constant_control(choice, ray, segment, low, high, average);
       least = most = constant;
       control.of_segment.push_back(constant);
       control.depth_before.push_back(control.depth);

@@ -111,6 +111,10 @@ struct Passage {
 //   CountLaw count_law(const Ray&, const RayProfile&, int channel) const
 //                                                           of a product of independent weights
 //   static constexpr bool kIgnoresMajorant                  lookups are no tentative collisions: not audited
+//   static constexpr bool kHeavySamples                     their fourth moment can be infinite while their variance is not, so
+//                                                           that no number of them shows it
+//   static constexpr bool kHeavyLookups                     their number has no variance at the defaults, so that its mean over
+//                                                           samples does not settle
 //   static constexpr bool kOwnFlights                       draws its flights by a law of its own
 //   static constexpr bool kLanes = true                     walks run side by side in registers, in double and in float: Walk
 //                                                           holds nothing but Value, Distance<Value> and Truth<Value>; init,

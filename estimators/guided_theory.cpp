@@ -1,52 +1,28 @@
 #include "estimators/guided_theory.h"
 
 #include <Eigen/LU>
-#include <boost/math/special_functions/legendre.hpp>
 #include <cmath>
 
 #include "estimators/kinks.h"
+#include "estimators/panel_rule.h"
 
 namespace nullmark {
 namespace {
 
 constexpr int kNodes = RayProfile::kNodes;
-using Square = Eigen::Matrix<Real, kNodes, kNodes>;
+using Square = PanelRule::Square;
 using Column = Eigen::Matrix<Real, kNodes, 1>;
-
-/// int_{x_i}^1 f = sum_j A_ij f(x_j) over the Gauss points x of [0, 1], exact to degree kNodes - 1.
-Square tail_integrals() {
-  const std::vector<Real> zeros = boost::math::legendre_p_zeros<Real>(kNodes);  // those that are not negative
-  Square values, integrals;
-  for (int i = 0; i < kNodes; ++i) {
-    constexpr int half = kNodes / 2;
-    const Real y = i < half ? -zeros[static_cast<std::size_t>(half - 1 - i)] : zeros[static_cast<std::size_t>(i - half)];
-    for (int n = 0; n < kNodes; ++n) {
-      values(i, n) = boost::math::legendre_p(n, y);
-      integrals(i, n) =
-          n == 0 ? (1 - y) / 2 : (boost::math::legendre_p(n - 1, y) - boost::math::legendre_p(n + 1, y)) / (2 * (2 * n + 1));
-    }
-  }
-  return integrals * values.inverse();
-}
 
 /// The profile cut where q reaches its least value, and finely.
 RayProfile refined(const Rates& majorant, const RayProfile& profile, Real least) {
   Rates level;
   level.start(majorant.begin());
-  std::vector<Real> ends, rates;
-  for (std::size_t i = 0; i < majorant.size(); ++i) {
-    ends.push_back(majorant.end(i));
-    rates.push_back(majorant.rate(i));
-    level.append(ends.back(), (1 - least) * rates.back());
-  }
+  for (std::size_t i = 0; i < majorant.size(); ++i) level.append(majorant.end(i), (1 - least) * majorant.rate(i));
   const RayProfile at_kinks = cut_at_levels(profile, majorant, {&level});
   std::vector<Real> cuts(at_kinks.cuts().begin(), at_kinks.cuts().end());
   constexpr int kParts = 16;
   for (int i = 1; i < kParts; ++i) cuts.push_back(profile.begin() + (profile.end() - profile.begin()) * i / kParts);
-  std::sort(cuts.begin(), cuts.end());
-  cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
-  return RayProfile([&profile](const Real* t, std::size_t count, Real* mu) { profile.extinction(t, count, mu); },
-                    profile.channels(), cuts, ends, rates);
+  return cut_anew(profile, std::move(cuts), majorant);
 }
 
 }  // namespace
@@ -56,7 +32,7 @@ Theory guided_moments(const Rates& majorant, const RayProfile& profile, int c, R
   const Real total = majorant.total_depth();
   if (!(total > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
   if (total > kDeepest) return {};
-  static const Square tail = tail_integrals();
+  const Square& tail = panel_rule().ahead;
   const RayProfile fine = refined(majorant, profile, least);
   const std::vector<RayProfile::Node>& nodes = fine.nodes(c);
   const std::size_t count = nodes.size();

@@ -2,12 +2,26 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "estimators/flight.h"
 #include "estimators/ray_profile.h"
 
 namespace nullmark {
+
+/// The extinction of a profile on panels with these cuts, in any order, and pieces.
+inline RayProfile cut_anew(const RayProfile& profile, std::vector<Real> cuts, const Rates& pieces) {
+  std::sort(cuts.begin(), cuts.end());
+  cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
+  std::vector<Real> ends, rates;
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    ends.push_back(pieces.end(i));
+    rates.push_back(pieces.rate(i));
+  }
+  return RayProfile([&profile](const Real* t, std::size_t count, Real* mu) { profile.extinction(t, count, mu); },
+                    profile.channels(), cuts, ends, rates);
+}
 
 /// The profile cut once more where an extinction crosses a level that is constant on each piece of the rates: theories with
 /// absolute values of differences bend there.  The profile itself is returned where none does, as under true bounds.
@@ -32,16 +46,7 @@ inline RayProfile cut_at_levels(const RayProfile& profile, const Rates& pieces, 
         cuts.push_back(high);
       }
   }
-  if (cuts.size() == before) return profile;
-  std::sort(cuts.begin(), cuts.end());
-  cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
-  std::vector<Real> ends, rates;
-  for (std::size_t i = 0; i < pieces.size(); ++i) {
-    ends.push_back(pieces.end(i));
-    rates.push_back(pieces.rate(i));
-  }
-  return RayProfile([&profile](const Real* t, std::size_t count, Real* mu) { profile.extinction(t, count, mu); },
-                    profile.channels(), cuts, ends, rates);
+  return cuts.size() == before ? profile : cut_anew(profile, std::move(cuts), pieces);
 }
 
 inline RayProfile cut_at_levels(const RayProfile& profile, const Rates& pieces, std::initializer_list<const Rates*> levels) {

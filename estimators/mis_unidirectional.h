@@ -1,6 +1,6 @@
 #pragma once
 
-#include "estimators/estimator.h"
+#include "estimators/vertex_sum.h"
 
 namespace nullmark {
 
@@ -40,30 +40,14 @@ struct UnidirectionalMis {
   Value result(const Walk& walk, const auto&) const { return walk.sum + walk.last; }
 
   /// From a vertex, S = c + (c if the flight leaves, else a S of the next vertex), and the mean of the latter is T - c - v c, so
-  /// M2 = g(0) + int_0^d mub a^2 k g dy with g = c^2 + 2 c (T(y,d) - v) + 3 v c^2, a = 1 - mu/mub and k(y) = exp(-int_0^y (2 mu -
-  /// mu^2/mub)).  Nothing where the panels do not resolve v.
+  /// g = c^2 + 2 c (T - v) + 3 v c^2 in vertex_sum_variance.  Nothing where the panels do not resolve v.
   Theory theory(const Passage<Value>& ray, const RayProfile& profile, int channel, Quantity) const {
     Theory theory{.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
     if (!profile.resolved()) return theory;
-    const Real tau = profile.optical_depth(channel), total = ray.majorant.total_depth();
-    const auto added = [&](Real depth_left, Real tau_left) {
+    theory.variance = vertex_sum_variance(ray, profile, channel, [](Real depth_left, Real tau_left) {
       const Real v = std::exp(-depth_left), c = v / (1 + v);
       return c * (c + 2 * (std::exp(-tau_left) - v) + 3 * v * c);
-    };
-    const auto rate = [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); };
-    const auto lost = profile.running(channel, [&](const RayProfile::Node& at) {
-      return at.extinction > 0 ? 2 * at.extinction - at.extinction * at.extinction / rate(at) : 0;
     });
-    const auto ahead = profile.running(channel, rate);
-    std::size_t j = 0;
-    const Real rest = profile.integrate(channel, [&](const RayProfile::Node& at) {
-      const Real k = std::exp(-lost[j]), depth_left = total - ahead[j];
-      ++j;
-      if (!(rate(at) > 0)) return Real{0};
-      const Real a = (rate(at) - at.extinction) / rate(at);
-      return rate(at) * a * a * k * added(depth_left, tau - at.depth);
-    });
-    theory.variance = std::max<Real>(0, added(total, tau) + rest - std::exp(-2 * tau));
     return theory;
   }
 

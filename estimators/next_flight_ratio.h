@@ -1,6 +1,6 @@
 #pragma once
 
-#include "estimators/estimator.h"
+#include "estimators/vertex_sum.h"
 
 namespace nullmark {
 
@@ -35,30 +35,15 @@ struct NextFlightRatioTracking {
 
   Value result(const Walk& walk, const auto&) const { return walk.sum; }
 
-  /// M2 = G(0) + int_0^d mub a^2 k G dy over local majorants, with v(y) = exp(-int_y^d mub), a = 1 - mu/mub, G = 2 v T(y,d) - v^2
-  /// and k(y) = exp(-int_0^y (2 mu - mu^2/mub)).  Nothing where the panels do not resolve v.
+  /// A vertex has v = exp(-majorant depth left) and g = v (2 T - v) in vertex_sum_variance.  Nothing where the panels do not
+  /// resolve v.
   Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     Theory theory{.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
     if (!profile.resolved()) return theory;
-    const Real tau = profile.optical_depth(c), total = ray.majorant.total_depth();
-    const auto square = [&](Real depth_left, Real tau_left) {
+    theory.variance = vertex_sum_variance(ray, profile, c, [](Real depth_left, Real tau_left) {
       const Real v = std::exp(-depth_left);
       return v * (2 * std::exp(-tau_left) - v);
-    };
-    const auto rate = [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); };
-    const auto lost = profile.running(c, [&](const RayProfile::Node& at) {
-      return at.extinction > 0 ? 2 * at.extinction - at.extinction * at.extinction / rate(at) : 0;
     });
-    const auto ahead = profile.running(c, rate);
-    std::size_t j = 0;
-    const Real rest = profile.integrate(c, [&](const RayProfile::Node& at) {
-      const Real k = std::exp(-lost[j]), depth_left = total - ahead[j];
-      ++j;
-      if (!(rate(at) > 0)) return Real{0};
-      const Real a = (rate(at) - at.extinction) / rate(at);
-      return rate(at) * a * a * k * square(depth_left, tau - at.depth);
-    });
-    theory.variance = std::max<Real>(0, square(total, tau) + rest - std::exp(-2 * tau));
     return theory;
   }
 };

@@ -32,17 +32,9 @@ struct PowerSeriesCmf {
     ray.always = ray.majorant.total_depth() > 0 ? ray.tail.first_at_most(1 - kShare) : 0;
   }
 
-  struct Walk {
-    SeriesSum<Value> series;
-    Real u = 0;  ///< uniform, given that the walk has come so far
-    std::int64_t lookups = 0;
-  };
+  using Walk = SeriesWalk<Value>;
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
-    walk.series.start(ray);
-    walk.u = rng.uniform();
-    walk.lookups = 0;
-  }
+  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const { walk.start(ray, rng); }
 
   bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
     if (++walk.lookups > ray.always) {

@@ -24,17 +24,12 @@ struct PowerSeriesCumulative {
 
   Claim claim(Quantity) const { return Claim::unbiased; }
 
-  struct Walk {
-    SeriesSum<Value> series;
-    Real u = 0;  ///< uniform, given that the walk has come so far
-    std::int64_t lookups = 0;
+  struct Walk : SeriesWalk<Value> {
     bool done = false;
   };
 
   void init(Walk& walk, const Passage<Value>& ray, Flight&, auto& rng) const {
-    walk.series.start(ray);
-    walk.u = rng.uniform();
-    walk.lookups = 0;
+    walk.start(ray, rng);
     walk.done = !(ray.majorant.total_depth() > 0);
   }
 

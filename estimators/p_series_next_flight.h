@@ -25,17 +25,9 @@ struct PowerSeriesNextFlight {
 
   void prepare(Ray& ray) const { ray.tail.set_up(ray.majorant.total_depth()); }
 
-  struct Walk {
-    SeriesSum<Value> series;
-    Real u = 0;
-    std::int64_t lookups = 0;
-  };
+  using Walk = SeriesWalk<Value>;
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
-    walk.series.start(ray);
-    walk.u = rng.uniform();
-    walk.lookups = 0;
-  }
+  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const { walk.start(ray, rng); }
 
   bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
     if (!(walk.u < ray.tail.at_least(walk.lookups + 1))) return false;

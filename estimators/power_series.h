@@ -72,6 +72,20 @@ class SeriesSum {
   int scale_ = 0;  ///< W = weight * 2^(64 scale), scale >= 0
 };
 
+/// What walks that sum terms have in common.
+template <class Value>
+struct SeriesWalk {
+  SeriesSum<Value> series;
+  Real u = 0;  ///< uniform, given that the walk has come so far
+  std::int64_t lookups = 0;
+
+  void start(const Passage<Value>& ray, auto& rng) {
+    series.start(ray);
+    u = rng.uniform();
+    lookups = 0;
+  }
+};
+
 /// P(N >= i) of a Poisson number N, as a table over the some 20 standard deviations where it is neither 1 nor below 2^-100, which
 /// is beyond what a uniform number of 53 bits tells apart.  Made in as many steps, by sums of positive terms from the far end.
 class PoissonTail {

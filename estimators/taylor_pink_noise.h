@@ -22,6 +22,7 @@ struct TaylorPinkNoise {
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kHeavySamples = true;
 
   Real c = 0.3;
 

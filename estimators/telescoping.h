@@ -21,6 +21,7 @@ struct Telescoping {
   static constexpr SampleRange kRange = SampleRange::any_sign;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kIgnoresMajorant = true;
+  static constexpr bool kHeavyLookups = true;
 
   Real r = 0.65;
 

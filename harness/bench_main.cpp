@@ -18,10 +18,11 @@ double median(std::vector<double> values) {
   return n % 2 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
 }
 
-/// Benchmarks are named group/what; the group's first entry is its hand-written baseline.  Prints the median nanoseconds of one
-/// counted item over the repetitions (of the thread, for other processes share the machine), their median absolute deviation and
-/// the ratio to the baseline: ratios of one process carry over to other machines, nanoseconds do not.  Where items take lookups,
-/// how many, and the nanoseconds of one.
+/// Benchmarks are named group/what; the group's baseline is the entry "0 ...", as a rule a hand-written one.  Prints the median
+/// nanoseconds of one counted item over the repetitions (of the thread, for other processes share the machine), their median
+/// absolute deviation and the ratio to the baseline: ratios of one process carry over to other machines, nanoseconds do not.
+/// Where items take lookups, how many, and the nanoseconds of one.  A filter that leaves a group's baseline out leaves its ratios
+/// out.
 class RatioReporter final : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context& context) override {
@@ -43,19 +44,20 @@ class RatioReporter final : public benchmark::BenchmarkReporter {
   void Finalize() override {
     // Interleaving reports cells in random order; by name they stand in groups with the baseline ("0 ...") first.
     std::string group;
-    double base = 0;
+    double base = 0;  // 0: the baseline was not run
     for (const auto& [name, figures] : figures_) {
       const std::size_t slash = name.find('/');
       const double ns = median(figures.ns), lookups = median(figures.lookups);
+      const std::string what = name.substr(slash + 1);
       if (name.substr(0, slash) != group) {
         group = name.substr(0, slash);
-        base = ns;
+        base = what.starts_with("0 ") ? ns : 0;
         fmt::print("\n{}\n", group);
       }
       std::vector<double> deviation;
       for (const double value : figures.ns) deviation.push_back(std::abs(value - ns));
-      fmt::print("  {:<48} {:9.2f} ns/{:<8} +-{:4.1f} %  {:6.2f}x", name.substr(slash + 1), ns, figures.item,
-                 100 * median(deviation) / ns, ns / base);
+      fmt::print("  {:<48} {:9.2f} ns/{:<8} +-{:4.1f} %  {:>6}", what, ns, figures.item, 100 * median(deviation) / ns,
+                 base > 0 ? fmt::format("{:.2f}x", ns / base) : "");
       if (lookups > 0) fmt::print("  {:7.2f} lookups of {:6.2f} ns", lookups, ns / lookups);
       fmt::print("\n");
     }

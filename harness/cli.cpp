@@ -152,6 +152,7 @@ class CommandLine {
       const Summary summary = summarise(run);
       if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
       warn(file_, version_remark(run));
+      warn(file_, busy_remark(run));
       if (!markdown_.empty())
         write_atomically(markdown_, fmt::format("{}{}{}", summary_markdown(run, summary, file_), cases_ ? "\n" : "",
                                                 cases_ ? stability_markdown(run) : ""));
@@ -160,8 +161,9 @@ class CommandLine {
       return summary.exit;
     });
     command->add_option("RESULTS", file_, "Results file")->required();
-    command->add_flag("--cases", cases_,
-                      "Also show per experiment and tracker what was finite, the largest sample, the worst error, the guards that fired");
+    command->add_flag(
+        "--cases", cases_,
+        "Also show per experiment and tracker what was finite, the largest sample, the worst error, the guards that fired");
     command->add_option("--junit", junit_, "Also write a JUnit report");
     command->add_option("--markdown", markdown_, "Also write a summary for a pull request");
   }
@@ -172,7 +174,10 @@ class CommandLine {
       const std::vector<RunRecord> runs = load_all(files_);
       const std::string ranking = compare_text(runs, baseline_, paired_);
       if (ranking.empty()) return report(ExitCode::nothing_ran, "no cell of these results was sampled; nothing to compare");
-      for (std::size_t i = 0; i < runs.size(); ++i) warn(files_[i], version_remark(runs[i]));
+      for (std::size_t i = 0; i < runs.size(); ++i) {
+        warn(files_[i], version_remark(runs[i]));
+        warn(files_[i], busy_remark(runs[i]));
+      }
       fmt::print("{}", ranking);
       if (!markdown_.empty()) write_atomically(markdown_, compare_markdown(runs, baseline_, paired_));
       return ExitCode::ok;

@@ -36,6 +36,9 @@ void add_traits(const std::string& name, Json& json) {
   json["claims"] = std::move(claims);
   json["range"] = to_string(entry.range);
   json["needs_bound"] = entry.needs_bound;
+  json["lanes"] = entry.in_lanes;
+  json["precisions"] = Json::array({to_string(Precision::float64)});
+  if (entry.in_lanes) json["precisions"].push_back(to_string(Precision::float32));
 }
 
 Json component_list(ComponentKind kind) {
@@ -72,8 +75,9 @@ void print_text(const Json& list) {
       std::string claims;
       for (const auto& [quantity, claim] : entry["claims"].items())
         claims += fmt::format("{}{} of {}", claims.empty() ? "" : ", ", plain(claim), quantity);
-      fmt::print("    {}; range: {}{}\n", claims, plain(entry["range"]),
-                 entry["needs_bound"].get<bool>() ? "; needs a majorant that bounds the extinction" : "");
+      fmt::print("    {}; range: {}{}{}\n", claims, plain(entry["range"]),
+                 entry["needs_bound"].get<bool>() ? "; needs a majorant that bounds the extinction" : "",
+                 entry["lanes"].get<bool>() ? "; runs in lanes, in double and in float" : "");
     }
     if (!entry.contains("parameters")) continue;
     for (const Json& parameter : entry["parameters"]) {

@@ -4,6 +4,7 @@
 #include "harness/compare.h"
 #include "harness/file_io.h"
 #include "harness/outputs.h"
+#include "harness/remarks.h"
 #include "harness/report/data.h"
 #include "harness/report/figures.h"
 #include "harness/report/page.h"
@@ -20,6 +21,8 @@ ExitCode report_command(const ReportCommand& command) {
   for (const std::string& file : command.results) words += " " + file;
   const ReportData data = report_data(runs, command.results, command.baseline, words + " -o " + command.output);
   for (const std::string& warning : data.warnings) fmt::print(stderr, "nullmark: warning: {}\n", warning);
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    if (const auto remark = busy_remark(runs[i])) fmt::print(stderr, "nullmark: warning: {}: {}\n", command.results[i], *remark);
   write_atomically(command.output, report_page(data.json));
   if (!command.markdown.empty()) write_atomically(command.markdown, compare_markdown(runs, command.baseline, true));
   fmt::print(stderr, "report: {}\n", command.output);

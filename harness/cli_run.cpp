@@ -21,6 +21,7 @@
 #include "harness/outputs.h"
 #include "harness/progress.h"
 #include "harness/provenance.h"
+#include "harness/remarks.h"
 #include "harness/results_json.h"
 #include "harness/run.h"
 #include "harness/spec_json.h"
@@ -203,6 +204,53 @@ ExitCode outcome(const std::vector<CellRecord>& cells) {
   return ExitCode::nothing_ran;
 }
 
+void warn_of_own_seeds(const Plan& plan, std::uint64_t seed) {
+  const auto own = std::find_if(plan.cells.begin(), plan.cells.end(), [&](const Cell& cell) { return cell.seed != seed; });
+  if (own != plan.cells.end())
+    fmt::print(stderr, "nullmark: warning: experiment \"{}\" names its seeds itself; --seed does not change them\n",
+               own->experiment);
+}
+
+/// Throws InputError where the output may not be written, or is there and neither to be completed nor replaced.
+std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vector<ConfigSource>& sources, const Plan& plan,
+                                      const std::string& output) {
+  refuse_overwriting(inputs_of(sources, plan), {output, Journal::path_for(output)});
+  if (std::filesystem::is_directory(output)) throw InputError(output + ": is a folder; expected the path of a results file");
+  using Mode = Journal::Mode;
+  auto journal = std::make_unique<Journal>(output, config_hash(plan.config_text),
+                                           command.resume  ? Mode::resume
+                                           : command.force ? Mode::overwrite
+                                                           : Mode::fresh);
+  if (!command.resume && !command.force && std::filesystem::exists(output))
+    throw InputError(output + ": exists; --resume completes it, --force replaces it");
+  return journal;
+}
+
+RunContext context_of(const RunCommand& command, const Plan& plan) {
+  RunContext context;
+  context.command_line = command.command_line;
+  context.threads = command.threads > 0 ? command.threads : static_cast<int>(std::thread::hardware_concurrency());
+  std::set<std::uint64_t> seeds;
+  for (const Cell& cell : plan.cells) seeds.insert(cell.seed);
+  context.seeds.assign(seeds.begin(), seeds.end());
+  return context;
+}
+
+/// `output` is empty where results go to standard output, and pictures nowhere.
+RunOptions options_of(const RunCommand& command, const std::string& output) {
+  RunOptions options;
+  options.threads = command.threads;
+  options.time_budget = command.time_budget;
+  options.timing = !command.no_timing;
+  options.interrupted = &received_signal;
+  if (!output.empty()) {
+    const std::filesystem::path images = std::filesystem::path(output).replace_extension(".images");
+    options.image_directory = images.string();
+    options.image_prefix = images.filename().string();
+  }
+  return options;
+}
+
 }  // namespace
 
 ExitCode run_command(const RunCommand& command) {
@@ -215,13 +263,7 @@ ExitCode run_command(const RunCommand& command) {
     fmt::print(stderr, "nullmark: nothing selected: none of {} cells passes --filter and --shard\n", plan.cells.size());
     return ExitCode::nothing_ran;
   }
-  if (seed)
-    for (const Cell& cell : plan.cells)
-      if (cell.seed != *seed) {
-        fmt::print(stderr, "nullmark: warning: experiment \"{}\" names its seeds itself; --seed does not change them\n",
-                   cell.experiment);
-        break;
-      }
+  if (seed) warn_of_own_seeds(plan, *seed);
   if (command.dry_run) return dry_run(plan, selected);
 
   const bool to_stdout = command.output == "-";
@@ -229,36 +271,11 @@ ExitCode run_command(const RunCommand& command) {
   std::unique_ptr<Journal> journal;
   Earlier earlier;
   if (!to_stdout) {
-    refuse_overwriting(inputs_of(sources, plan), {output, Journal::path_for(output)});
-    if (std::filesystem::is_directory(output)) throw InputError(output + ": is a folder; expected the path of a results file");
-    using Mode = Journal::Mode;
-    journal = std::make_unique<Journal>(output, config_hash(plan.config_text),
-                                        command.resume  ? Mode::resume
-                                        : command.force ? Mode::overwrite
-                                                        : Mode::fresh);
-    if (command.resume)
-      earlier = earlier_results(plan, output, *journal);
-    else if (!command.force && std::filesystem::exists(output))
-      throw InputError(output + ": exists; --resume completes it, --force replaces it");
+    journal = open_journal(command, sources, plan, output);
+    if (command.resume) earlier = earlier_results(plan, output, *journal);
   }
-
-  RunContext context;
-  context.command_line = command.command_line;
-  context.threads = command.threads > 0 ? command.threads : static_cast<int>(std::thread::hardware_concurrency());
-  std::set<std::uint64_t> seeds;
-  for (const Cell& cell : plan.cells) seeds.insert(cell.seed);
-  context.seeds.assign(seeds.begin(), seeds.end());
-
-  RunOptions options;
-  options.threads = command.threads;
-  options.time_budget = command.time_budget;
-  options.timing = !command.no_timing;
-  options.interrupted = &received_signal;
-  if (!to_stdout) {
-    const std::filesystem::path images = std::filesystem::path(output).replace_extension(".images");
-    options.image_directory = images.string();
-    options.image_prefix = images.filename().string();
-  }
+  RunContext context = context_of(command, plan);
+  const RunOptions options = options_of(command, to_stdout ? "" : output);
 
   std::vector<CellRecord> finished;
   for (const auto& [place, record] : earlier)
@@ -299,6 +316,7 @@ ExitCode run_command(const RunCommand& command) {
     journal->remove();
     fmt::print("{}", results_tables(run));
     fmt::print(stderr, "results: {}\n", output);
+    if (const auto remark = busy_remark(run)) fmt::print(stderr, "nullmark: warning: {}\n", *remark);
   }
   return outcome(run.cells);
 }

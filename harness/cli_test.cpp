@@ -1,6 +1,7 @@
 #include "harness/exit_code.h"
 #include "harness/journal.h"
 #include "harness/program_test.h"
+#include "harness/registry.h"
 
 namespace nullmark {
 namespace {
@@ -216,6 +217,14 @@ TEST_F(Cli, ListsSchemasAndVersion) {
     EXPECT_EQ(run(std::string("list ") + what), 0);
     EXPECT_EQ(run(std::string("list --json ") + what), 0);
     EXPECT_FALSE(Json::parse(read("out")).empty()) << what;
+  }
+  EXPECT_EQ(run("list --json estimators"), 0);
+  for (const Json& entry : Json::parse(read("out"))) {
+    const std::string name = entry["name"].get<std::string>();
+    const auto source = Registry<EstimatorEntry>::instance().find(name)->make();
+    const bool in_float = source->kernel(1, Precision::float32) != nullptr;
+    EXPECT_EQ(entry["lanes"].get<bool>(), in_float) << name;
+    EXPECT_EQ(entry["precisions"].size(), in_float ? 2u : 1u) << name;
   }
   for (const char* which : {"config", "results"}) {
     EXPECT_EQ(run(std::string("schema ") + which), 0);

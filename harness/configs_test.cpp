@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -130,9 +131,7 @@ TEST(Configs, EveryClaimOfTheListIsPutToTheTest) {
 
 TEST(Configs, Seed000ResidualsHaveTheirExpectation) {
   Plan plan = shipped("seed_000_controls.json");
-  std::vector<bool> selected;
-  for (const Cell& cell : plan.cells) selected.push_back(cell.experiment == "expectation");
-  const auto records = run_untimed(plan, selected);
+  const auto records = run_untimed(plan, [](const Cell& cell) { return cell.experiment == "expectation"; });
   EXPECT_EQ(records.size(), 6u);
   for (const CellRecord& record : records) {
     const ChannelRecord& channel = record.channel[0];
@@ -144,10 +143,9 @@ TEST(Configs, Seed000ResidualsHaveTheirExpectation) {
 /// Trees of a homogeneous medium are one cell, so its walks are those of the global majorant, bit for bit and under either rule.
 TEST(Configs, Seed000TreesLeaveHomogeneousMediaAlone) {
   const Plan plan = shipped("seed_000_kdtree.json");
-  std::vector<bool> selected;
-  for (const Cell& cell : plan.cells)
-    selected.push_back(cell.experiment == "procedural" && plan.media[cell.medium].field.type == "homogeneous");
-  const auto records = run_untimed(plan, selected);
+  const auto records = run_untimed(plan, [&](const Cell& cell) {
+    return cell.experiment == "procedural" && plan.media[cell.medium].field.type == "homogeneous";
+  });
   std::map<std::string, const CellRecord*> global;
   for (const CellRecord& record : records)
     if (record.majorant.type == "global") global[record.cell.estimator.label] = &record;
@@ -237,12 +235,15 @@ TEST_F(RealVolumes, ReferencesAgreeWithAMillionStepMarch) {
   }
 }
 
+std::function<bool(const Cell&)> ratio_on_smoke(const Plan& plan) {
+  return [&plan](const Cell& cell) {
+    return plan.media[cell.medium].label.find("/smoke.vdb") != std::string::npos && cell.estimator.label == "ratio";
+  };
+}
+
 TEST_F(RealVolumes, AGridMajorantSavesLookupsOnSmokeAndLeavesTheTransmittance) {
   Plan plan = shipped("volumes.json");
-  std::vector<bool> selected;
-  for (const Cell& cell : plan.cells)
-    selected.push_back(plan.media[cell.medium].label.find("/smoke.vdb") != std::string::npos && cell.estimator.label == "ratio");
-  const auto records = run_untimed(plan, selected);
+  const auto records = run_untimed(plan, ratio_on_smoke(plan));
   std::map<std::string, std::map<std::string, const CellRecord*>> by_medium;
   for (const CellRecord& record : records) by_medium[record.medium.label][record.majorant.type] = &record;
   EXPECT_EQ(by_medium.size(), 2u);
@@ -260,10 +261,7 @@ TEST_F(RealVolumes, AGridMajorantSavesLookupsOnSmokeAndLeavesTheTransmittance) {
 /// The published claim is 10 to 100 times fewer lookups on inhomogeneous media.
 TEST_F(RealVolumes, TreesSaveLookupsOnSmokeAndLeaveTheTransmittance) {
   Plan plan = shipped("seed_000_kdtree.json");
-  std::vector<bool> selected;
-  for (const Cell& cell : plan.cells)
-    selected.push_back(plan.media[cell.medium].label.find("/smoke.vdb") != std::string::npos && cell.estimator.label == "ratio");
-  const auto records = run_untimed(plan, selected);
+  const auto records = run_untimed(plan, ratio_on_smoke(plan));
   ASSERT_EQ(records.size(), 13u);
   const CellRecord& global = records[0];
   EXPECT_EQ(global.majorant.type, "global");

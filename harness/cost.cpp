@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/metrics.h"
+
 namespace nullmark {
 namespace {
 
@@ -39,7 +41,7 @@ std::optional<Cost> cost_of(const CellRecord& record) {
   Real variance = 0, mean_square_error = 0, reference = 0, relative_error = 0;
   bool analytic = true, errors_known = true;
   for (const ChannelRecord& channel : record.channel) {
-    const auto& best = channel.variance_theory ? channel.variance_theory : channel.variance;
+    const std::optional<Real>& best = best_variance(channel);
     if (!best || !channel.reference) return std::nullopt;
     variance += *best;
     reference += square(channel.reference_rms.value_or(std::abs(*channel.reference)));

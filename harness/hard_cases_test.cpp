@@ -25,10 +25,8 @@ namespace {
 
 RunRecord run_of(
     const Plan& plan, const std::function<bool(const Cell&)>& wanted = [](const Cell&) { return true; }) {
-  std::vector<bool> selected;
-  for (const Cell& cell : plan.cells) selected.push_back(wanted(cell));
   RunRecord run;
-  run.cells = run_untimed(plan, selected);
+  run.cells = run_untimed(plan, wanted);
   return run;
 }
 

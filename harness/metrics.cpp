@@ -64,11 +64,6 @@ std::optional<Real> sample_rmse_theory(const CellRecord& record) {
   return std::sqrt(*rmse * *rmse + *variance * (1 - 1 / static_cast<Real>(record.cell.samples_per_ray)));
 }
 
-std::optional<Real> best_variance(const CellRecord& record, std::size_t channel) {
-  const ChannelRecord& of = record.channel[channel];
-  return of.variance_theory ? of.variance_theory : of.variance;
-}
-
 /// What a metric that is theory's predicts: "variance" of "variance_theory".
 std::string_view predicted_metric(std::string_view name) {
   if (name == "lookups_theory") return "lookups_per_sample";
@@ -212,14 +207,18 @@ std::optional<Real> standard_error(const CellRecord& record, std::string_view na
   return std::nullopt;
 }
 
+const std::optional<Real>& best_variance(const ChannelRecord& channel) {
+  return channel.variance_theory ? channel.variance_theory : channel.variance;
+}
+
 std::optional<Real> variance_x_lookups(const CellRecord& record, std::size_t channel) {
-  const std::optional<Real> variance = best_variance(record, channel);
+  const std::optional<Real>& variance = best_variance(record.channel[channel]);
   if (!variance || !record.lookups_per_sample) return std::nullopt;
   return *variance * *record.lookups_per_sample;
 }
 
 std::optional<Real> variance_x_ns(const CellRecord& record, std::size_t channel) {
-  const std::optional<Real> variance = best_variance(record, channel);
+  const std::optional<Real>& variance = best_variance(record.channel[channel]);
   if (!variance || !record.time) return std::nullopt;
   return *variance * record.time->ns_per_sample;
 }

@@ -23,6 +23,9 @@ std::optional<Real> metric_theory(const CellRecord& record, std::string_view nam
 /// Standard error of `metric`, never too small where rays differ; 0 for what is counted exactly, nothing where it is not known.
 std::optional<Real> standard_error(const CellRecord& record, std::string_view name);
 
+/// Of a sample: the analytic one where known, else as measured.
+const std::optional<Real>& best_variance(const ChannelRecord& channel);
+
 /// variance x lookups and variance x ns: lower is better.  Variance is the analytic one where known.
 std::optional<Real> variance_x_lookups(const CellRecord& record, std::size_t channel);
 std::optional<Real> variance_x_ns(const CellRecord& record, std::size_t channel);

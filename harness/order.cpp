@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 
@@ -94,7 +95,7 @@ std::vector<OrderFit> fit_orders(const std::vector<CellRecord>& cells) {
         steps == record.cell.estimator.values.end() || !std::holds_alternative<int>(steps->second))
       continue;
     const ChannelRecord& channel = record.channel.front();
-    const auto variance = channel.variance_theory ? channel.variance_theory : channel.variance;
+    const std::optional<Real>& variance = best_variance(channel);
     if (!channel.bias || !variance) continue;
     const Real noise = std::sqrt(*variance / static_cast<Real>(record.samples));
     const Real error = std::max({noise, kBeyondReference / kResolved * channel.reference_error.value_or(0), 1e-14});

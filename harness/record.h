@@ -51,6 +51,7 @@ struct TimeRecord {
   Real majorant_build_seconds = 0;   ///< wall time of building the majorant structure, on all threads
   std::vector<BatchTime> batches{};  ///< ascending; the last is that of ns_per_sample; empty where it is the only one
   Real memory_ratio = 0;             ///< of volumes: ns per lookup over one read of a random cache line of as many bytes; else 0
+  std::optional<Real> waiting{};     ///< share of the wall time in which the timed thread did not run, median over repetitions
 };
 
 /// PASS: |bias| < epsilon is proven.  FAIL: bias is proven.  INCONCLUSIVE: neither, with the reason.  VIOLATED: the estimator

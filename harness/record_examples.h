@@ -66,6 +66,7 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
     record.majorant_violations = 3;
     record.largest_violation = 1 + 2.220446049250313e-16;
     record.time = TimeRecord{next(), next(), next(), next(), next(), 2, 1, 64, {next(), next()}, next()};
+    record.time->waiting = 1. / 3;
     record.time->batches = {{1, next(), next()}, {64, record.time->ns_per_sample, record.time->mad}};
     record.squared_error_blocks = {next(), next()};
     for (const std::uint64_t samples : {std::uint64_t{1}, std::uint64_t{2}}) {

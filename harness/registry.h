@@ -10,11 +10,13 @@
 
 namespace nullmark {
 
-/// What `nullmark list` tells of an estimator.
+/// What commands and tests know of an estimator by its name; the facts are those of estimator.h.
 struct EstimatorEntry {
   std::string name, summary, source;
   SampleRange range = SampleRange::any_sign;
   bool needs_bound = false;
+  bool in_lanes = false;  ///< grey walks run side by side in registers, in double and in float
+  bool ignores_majorant = false, heavy_samples = false, heavy_lookups = false;
   std::vector<Quantity> quantities;  ///< that it answers on grey media
   std::unique_ptr<EstimatorSource> (*make)() = nullptr;
   bool planted = false;   ///< a deliberately wrong tracker that the tests must catch; runs when named, is never listed
@@ -30,6 +32,10 @@ EstimatorEntry estimator_entry() {
   entry.source = E::kSource;
   entry.range = Estimator<Spectrum>::kRange;
   entry.needs_bound = E::kNeedsBound;
+  entry.in_lanes = runs_in_lanes<Estimator>();
+  entry.ignores_majorant = requires { E::kIgnoresMajorant; };
+  entry.heavy_samples = requires { E::kHeavySamples; };
+  entry.heavy_lookups = requires { E::kHeavyLookups; };
   const auto kernel = EstimatorTemplate<Estimator>().kernel(1);
   for (std::size_t i = 0; i < kQuantities; ++i)
     if (kernel->answers(static_cast<Quantity>(i))) entry.quantities.push_back(static_cast<Quantity>(i));

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "harness/json_input.h"
 #include "harness/provenance.h"
 
@@ -32,6 +34,23 @@ std::optional<std::string> version_remark(const RunRecord& run) {
   const std::string measured = measured_by(run), read = this_version();
   if (measured == read) return std::nullopt;
   return fmt::format("measured by {}, read by {}; run the configuration again where versions matter", measured, read);
+}
+
+std::optional<std::string> busy_remark(const RunRecord& run) {
+  std::size_t timed = 0, busy = 0;
+  Real most = 0;
+  for (const CellRecord& record : run.cells) {
+    if (!record.time) continue;
+    ++timed;
+    const Real waiting = record.time->waiting.value_or(0);
+    busy += waiting > kBusy;
+    most = std::max(most, waiting);
+  }
+  if (busy == 0) return std::nullopt;
+  return fmt::format(
+      "{} of {} cells were timed on a busy machine, where the thread waited up to {:.0f} % of the time; time them again on a "
+      "quiet one",
+      busy, timed, 100 * most);
 }
 
 }  // namespace nullmark

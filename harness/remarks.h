@@ -14,4 +14,10 @@ std::string this_version();
 /// One line where the results say that they are of another version than this program, whose verdicts and tables they get.
 std::optional<std::string> version_remark(const RunRecord& run);
 
+/// A timed thread that waited for a larger share of the wall time than this was kept from its core by other work.
+inline constexpr Real kBusy = 0.05;
+
+/// One line where times were taken on a busy machine.
+std::optional<std::string> busy_remark(const RunRecord& run);
+
 }  // namespace nullmark

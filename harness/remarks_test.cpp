@@ -19,6 +19,17 @@ TEST(Remarks, ResultsOfAnotherVersionSaySo) {
   EXPECT_NE(version_remark(run)->find("measured by 0.0.1 (0123456), read by " + this_version()), std::string::npos);
 }
 
+TEST(Remarks, TimesOfABusyMachineSaySo) {
+  RunRecord run = example_results();
+  for (CellRecord& record : run.cells) record.time->waiting = kBusy;
+  run.cells[0].time->waiting.reset();  // results that do not tell
+  EXPECT_FALSE(busy_remark(run));
+  run.cells[1].time->waiting = 0.4;
+  EXPECT_EQ(busy_remark(run),
+            "1 of 4 cells were timed on a busy machine, where the thread waited up to 40 % of the time; time them again on a "
+            "quiet one");
+}
+
 TEST(Summary, SaysThatTheConfigurationDisabledTheVerdict) {
   const Plan plan = read_config(R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
       "gate":{"enabled":false},"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}]})",

@@ -83,6 +83,7 @@ Json time_json(const CellRecord& record) {
           {"loop_ratio", real(time.loop_ratio)},
           {"repetitions", time.repetitions},
           {"mad", real(time.mad)},
+          {"waiting", real(time.waiting)},
           {"threads", time.threads},
           {"traversal_included", true},
           {"samples_per_traversal", time.samples_per_traversal},
@@ -203,6 +204,7 @@ TimeRecord read_time(const Place& place) {
   if (place.has("memory_ratio")) time.memory_ratio = optional_real(place, "memory_ratio").value_or(0);
   time.loop_ratio = real_or_nan(place, "loop_ratio");
   time.mad = real_or_nan(place, "mad");
+  time.waiting = optional_real(place, "waiting");
   time.repetitions = static_cast<int>(place["repetitions"].integer(0, std::numeric_limits<int>::max()));
   time.threads = static_cast<int>(place["threads"].integer(0, std::numeric_limits<int>::max()));
   time.samples_per_traversal = count(place, "samples_per_traversal");

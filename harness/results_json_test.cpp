@@ -56,6 +56,7 @@ TEST(ResultsJson, EveryFieldComesBackBitForBit) {
     EXPECT_EQ(a.largest_violation, b.largest_violation);
     EXPECT_EQ(a.time->repetition_ns, b.time->repetition_ns);
     EXPECT_EQ(a.time->loop_ratio, b.time->loop_ratio);
+    EXPECT_EQ(a.time->waiting, b.time->waiting);
     EXPECT_EQ(a.time->majorant_build_seconds, b.time->majorant_build_seconds);
     EXPECT_EQ(a.squared_error_blocks, b.squared_error_blocks);
     ASSERT_EQ(b.time->batches.size(), 2u);

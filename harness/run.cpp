@@ -19,6 +19,7 @@
 #include "harness/free_path_law.h"
 #include "harness/image.h"
 #include "harness/laws.h"
+#include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 #include "harness/path_kernel.h"
@@ -526,7 +527,7 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
       record.variance_basis = "analytic";
     }
     if (o < prepared.theory.bias.size() && prepared.theory.bias[o]) out.bias_theory = finite(*prepared.theory.bias[o]);
-    const std::optional<Real> best = out.variance_theory ? out.variance_theory : out.variance;
+    const std::optional<Real>& best = best_variance(out);
     if (best && reference_square > 0) out.relative_variance = finite(*best * n / reference_square);
     const auto count = static_cast<Real>(pooled.count);
     if (pooled.s2 > 0) out.kurtosis = finite(count * pooled.s4 / (pooled.s2 * pooled.s2));

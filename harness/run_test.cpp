@@ -10,6 +10,7 @@
 
 #include "harness/config.h"
 #include "harness/results_json.h"
+#include "harness/timing.h"
 
 namespace nullmark {
 namespace {
@@ -75,6 +76,13 @@ TEST(Run, AChannelThatIsNotFiniteTakesNothingFromTheOthers) {
 }
 
 /// Fewer samples share the cost of a walk through many cells, so each costs more; how much more is measured, not its sign alone.
+TEST(Run, TheShareOfWaitingIsWhatTheThreadsClockLacks) {
+  EXPECT_EQ(waiting_share(4, 3), 0.25);
+  EXPECT_EQ(waiting_share(4, 4), 0);
+  EXPECT_EQ(waiting_share(4, 4.5), 0);
+  EXPECT_EQ(waiting_share(0, 0), 0);
+}
+
 TEST(Run, TimesEveryNumberOfSamplesPerTraversal) {
   const Plan cells =
       read_config(R"({"$schema":"nullmark/config/1","timing":{"repetitions":3,"seconds":0.002,"samples_per_traversal":[1,16,64]},
@@ -89,6 +97,7 @@ TEST(Run, TimesEveryNumberOfSamplesPerTraversal) {
   EXPECT_EQ(record.time->batches[2].ns_per_sample, record.time->ns_per_sample);
   EXPECT_GT(record.time->batches[0].ns_per_sample, 4 * record.time->ns_per_sample);
   EXPECT_EQ(record.time->repetition_ns.size(), 3u);
+  ASSERT_TRUE(record.time->waiting);
 }
 
 TEST(Run, TellsOfEveryCellOnceAndOneAtATime) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,12 @@ inline std::vector<CellRecord> run_untimed(const Plan& plan, std::vector<bool> s
   options.threads = threads;
   options.timing = false;
   return run_plan(plan, selected, {}, options, {});
+}
+
+inline std::vector<CellRecord> run_untimed(const Plan& plan, const std::function<bool(const Cell&)>& wanted) {
+  std::vector<bool> selected;
+  for (const Cell& cell : plan.cells) selected.push_back(wanted(cell));
+  return run_untimed(plan, selected);
 }
 
 }  // namespace nullmark

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "harness/cell_names.h"
+#include "harness/metrics.h"
 #include "harness/summary.h"
 #include "harness/table.h"
 
@@ -82,7 +83,7 @@ struct Case {
   /// A mean that has underflowed is compared as it stands.
   void add_error(const CellRecord& record, const ChannelRecord& channel) {
     if (!channel.bias || !channel.reference) return;
-    const std::optional<Real> variance = channel.variance_theory ? channel.variance_theory : channel.variance;
+    const std::optional<Real>& variance = best_variance(channel);
     const Real scale = std::max(std::abs(*channel.reference), std::numeric_limits<Real>::min());
     constexpr Real kRounding = 1e-26;
     if (!variance || *variance <= kRounding * scale * scale)

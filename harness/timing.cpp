@@ -32,9 +32,9 @@ std::vector<std::size_t> timed_rays(const BuiltRays& rays) {
   return chosen;
 }
 
-/// Nanoseconds and lookups of one repetition.
 struct Repetition {
   Real ns_per_iteration = 0, samples = 0, lookups = 0;
+  Real waiting = 0;  ///< see waiting_share
 };
 
 class Collector final : public benchmark::BenchmarkReporter {
@@ -48,8 +48,8 @@ class Collector final : public benchmark::BenchmarkReporter {
       if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
       const auto iterations = static_cast<Real>(run.iterations);
       all[run.run_name.function_name].push_back({run.real_accumulated_time / iterations * 1e9,
-                                                 run.counters.at("samples") / iterations,
-                                                 run.counters.at("lookups") / iterations});
+                                                 run.counters.at("samples") / iterations, run.counters.at("lookups") / iterations,
+                                                 waiting_share(run.real_accumulated_time, run.cpu_accumulated_time)});
       progress_(static_cast<double>(++seen_) / static_cast<double>(expected_));
     }
   }
@@ -122,6 +122,10 @@ void run_cell(benchmark::State& state, const TimedCell& timed, const std::vector
 }
 
 }  // namespace
+
+Real waiting_share(Real wall_seconds, Real thread_seconds) {
+  return wall_seconds > thread_seconds ? 1 - thread_seconds / wall_seconds : 0;
+}
 
 std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& plan,
                                                   const std::function<bool()>& stop,
@@ -213,7 +217,9 @@ std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& 
       for (const std::uint64_t samples : plan.samples_per_traversal)
         if (const auto& of_batch = collector.all[batch_name(i, samples)]; of_batch.size() == whole)
           time.batches.push_back(batch_time(samples, sample_times(of_batch)));
-    std::vector<Real> lookup_ns;
+    std::vector<Real> lookup_ns, waiting;
+    for (const Repetition& repetition : repetitions) waiting.push_back(repetition.waiting);
+    time.waiting = median(waiting);
     for (const Repetition& repetition : repetitions)
       if (repetition.lookups > 0) lookup_ns.push_back(repetition.ns_per_iteration / repetition.lookups);
     if (!lookup_ns.empty()) {

@@ -15,6 +15,10 @@ struct TimedCell {
   const Kernel* kernel = nullptr;
 };
 
+/// Share of the wall time in which a thread did not run, for other work had its core; 0 where its clock went ahead of the wall's,
+/// as clocks may by as little as they resolve.
+Real waiting_share(Real wall_seconds, Real thread_seconds);
+
 /// Wall time of every cell's kernel, traversal included, on one thread, with Google Benchmark: repetitions of all cells and of
 /// two calibration loops are interleaved at random, medians and median absolute deviations are taken over them.  `done` is told
 /// of each repetition.  Stops between repetitions once `stop` answers true; unfinished cells keep no time.
