@@ -1,0 +1,51 @@
+#pragma once
+
+#include "estimators/estimator.h"
+
+namespace nullmark {
+
+/// Ratio tracking whose weight plays Russian roulette once it is below a threshold [Novak, Selle, Jarosz 2014, Sec. 3; Pharr,
+/// Jakob, Humphreys 2023, Sec. 14.2]: it goes on over `survival` with that probability and ends at 0 otherwise.  Bounds the cost of
+/// thick rays, whose weights are small long before the end, and pays with variance.  Of several channels the largest weight
+/// decides.  In [0,1] where the majorant bounds, since threshold <= survival.
+template <class Value>
+struct RatioRoulette {
+  static constexpr const char* kName = "ratio_roulette";
+  static constexpr const char* kSummary = "ratio tracking with Russian roulette on small weights";
+  static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Sec. 3; Pharr, Jakob, Humphreys 2023, Sec. 14.2";
+  static constexpr SampleRange kRange = SampleRange::unit;
+  static constexpr bool kNeedsBound = false;
+
+  Real threshold = 0.05, survival = 0.25;
+
+  void parameters(ParameterVisitor& visit) {
+    visit.number("threshold", threshold, Range::between(0, 1), "", "weight below which roulette is played");
+    visit.number("survival", survival, {0, 1, true}, "", "chance to go on; at least the threshold");
+  }
+
+  void check(const Extrema&) const {
+    if (survival < threshold) throw ParameterError("survival", "survival is below the threshold; weights would exceed 1");
+  }
+
+  Claim claim(Quantity) const { return Claim::unbiased; }
+
+  struct Walk {
+    Value weight;
+    bool ended = false;
+  };
+
+  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), false}; }
+
+  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const { return !walk.ended && flight.next(rng); }
+
+  void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto& rng) const {
+    walk.weight *= (at.rate() - extinction) / at.rate();
+    if (!(largest(magnitude(walk.weight)) < threshold)) return;
+    walk.ended = !(rng.uniform() < survival);
+    walk.weight *= walk.ended ? 0 : 1 / survival;
+  }
+
+  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+};
+
+}  // namespace nullmark
