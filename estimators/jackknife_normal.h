@@ -7,8 +7,8 @@
 
 namespace nullmark {
 
-/// Transmittance from two optical depths X_0, X_1 that are normal with mean tau and standard deviation s, whatever the medium: the
-/// case for which the jackknife is made [Peters 2025; Gray et al. 1973].  tau is the ray's own, and nothing is looked up.
+/// Transmittance from two optical depths X_0, X_1 that are normal with mean tau and standard deviation s, whatever the medium:
+/// the case for which the jackknife is made [Peters 2025; Gray et al. 1973].  tau is the ray's own, and nothing is looked up.
 ///
 ///   jackknife   cos((X_0 - X_1)/2) e^{-(X_0 + X_1)/2}: unbiased, Var = e^{-2 tau} (e^{s^2} - 1)/2
 ///   naive       e^{-(X_0 + X_1)/2}: mean e^{-tau + s^2/4}, Var = e^{-2 tau} (e^{s^2} - e^{s^2/2})

@@ -11,8 +11,9 @@ namespace {
 std::vector<CellRecord> run_of(const std::string& estimator, const std::string& medium, std::uint64_t samples) {
   return run_untimed(read_config(
       R"({"$schema":"nullmark/config/1","name":"t","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",)"
-      R"("samples_per_ray":)" + std::to_string(samples) + R"(,"gate":{"enabled":false},"matrix":{"estimator":)" + estimator +
-          R"(,"medium":)" + medium + "}}]}",
+      R"("samples_per_ray":)" +
+          std::to_string(samples) + R"(,"gate":{"enabled":false},"matrix":{"estimator":)" + estimator + R"(,"medium":)" + medium +
+          "}}]}",
       "t.json"));
 }
 
@@ -34,8 +35,9 @@ TEST(TelescopingDifference, OneStepAndAllDifferencesAreTheTransmittance) {
 }
 
 TEST(TelescopingDifference, TakesWhatItsMarchesTake) {
-  const auto cells = run_of(R"([{"type":"telescoping_difference","level":3},{"type":"telescoping_difference","level":3,"marches":"independent"}])",
-                            R"("linear")", 100);
+  const auto cells = run_of(
+      R"([{"type":"telescoping_difference","level":3},{"type":"telescoping_difference","level":3,"marches":"independent"}])",
+      R"("linear")", 100);
   EXPECT_EQ(*cells[0].lookups_per_sample, 16);
   EXPECT_EQ(*cells[1].lookups_per_sample, 24);
 }

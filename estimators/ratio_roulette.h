@@ -5,8 +5,8 @@
 namespace nullmark {
 
 /// Ratio tracking whose weight plays Russian roulette once it is below a threshold [Novak, Selle, Jarosz 2014, Sec. 3; Pharr,
-/// Jakob, Humphreys 2023, Sec. 14.2]: it goes on over `survival` with that probability and ends at 0 otherwise.  Bounds the cost of
-/// thick rays, whose weights are small long before the end, and pays with variance.  Of several channels the largest weight
+/// Jakob, Humphreys 2023, Sec. 14.2]: it goes on over `survival` with that probability and ends at 0 otherwise.  Bounds the cost
+/// of thick rays, whose weights are small long before the end, and pays with variance.  Of several channels the largest weight
 /// decides.  In [0,1] where the majorant bounds, since threshold <= survival.
 template <class Value>
 struct RatioRoulette {

@@ -46,9 +46,7 @@ struct TelescopingDifference {
     Real offset = 0, done = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
-    walk = {ray.value(0), ray.value(0), rng.uniform(), 0};
-  }
+  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const { walk = {ray.value(0), ray.value(0), rng.uniform(), 0}; }
 
   bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
     const Real fine = ray.steps, all = ray.correlated ? fine : 1.5 * fine;
@@ -70,8 +68,8 @@ struct TelescopingDifference {
     const Real coarse = ray.length() / (ray.steps / 2), fine = ray.length() / ray.steps;
     for (int c = 0; c < ray.channels; ++c) {
       const Real first = channel(walk.first, c), second = channel(walk.second, c);
-      channel(difference, c) =
-          ray.correlated ? march_difference(first * coarse, second * coarse) : std::exp(-first * fine) - std::exp(-second * coarse);
+      channel(difference, c) = ray.correlated ? march_difference(first * coarse, second * coarse)
+                                              : std::exp(-first * fine) - std::exp(-second * coarse);
     }
     return difference;
   }

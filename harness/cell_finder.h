@@ -26,8 +26,9 @@ class CellFinder {
   /// All that fit, in the order of the configuration; of a list of patterns one after the other.  Throws InputError for none.
   std::vector<std::string> all(const Place& place) const;
 
-  /// For each cell that `of` finds, the one that fits the pattern `place` and agrees with it on all axes that the pattern does not
-  /// name (experiments count as one); of several, the one whose estimator differs in no parameter but those named.  Throws InputError where there is not exactly one.
+  /// For each cell that `of` finds, the one that fits the pattern `place` and agrees with it on all axes that the pattern does
+  /// not name (experiments count as one); of several, the one whose estimator differs in no parameter but those named.  Throws
+  /// InputError where there is not exactly one.
   std::vector<std::string> counterparts(const Place& of, const Place& place) const;
 
  private:

@@ -29,7 +29,8 @@ void read_compared_with(const Place& part, const Place& place, const CellFinder&
     out.theory = true;
     return;
   }
-  const bool number = place.json().is_number() || (place.json().is_array() && !place.json().empty() && place[0].json().is_number());
+  const bool number =
+      place.json().is_number() || (place.json().is_array() && !place.json().empty() && place[0].json().is_number());
   if (number)
     for (const Place& value : place.elements_or_self()) out.numbers.push_back(value.number());
   else

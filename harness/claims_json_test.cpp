@@ -14,7 +14,8 @@ std::string config(const std::string& claims) {
      "matrix":{"estimator":["ratio","delta",{"type":"residual_ratio","control":["minimum","average"],"rate_scale":[1,2]}],
                "medium":["linear","cosine"]}},
     {"name":"f","rays":"single","samples_per_ray":[10],"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}],
-    "claims":[)" + claims + "]}";
+    "claims":[)" +
+         claims + "]}";
 }
 
 std::string claim(const std::string& part) { return R"({"id":"C","source":"S","claim":"T","parts":[)" + part + "]}"; }
@@ -33,8 +34,8 @@ std::string error_of(const std::string& claims) {
 using Names = std::vector<std::string>;
 
 TEST(Claims, PatternsFindCellsAndTheirCounterparts) {
-  const ClaimPart part = part_of(
-      R"({"metric":"variance","cells":{"experiment":"e","estimator":"ratio"},"at_most":{"estimator":"delta"}})");
+  const ClaimPart part =
+      part_of(R"({"metric":"variance","cells":{"experiment":"e","estimator":"ratio"},"at_most":{"estimator":"delta"}})");
   EXPECT_EQ(part.cells, (Names{"e/ratio/linear/global", "e/ratio/cosine/global"}));
   EXPECT_EQ(part.others, (Names{"e/delta/linear/global", "e/delta/cosine/global"}));
   EXPECT_EQ(part.relation, Relation::at_most);

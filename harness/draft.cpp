@@ -185,7 +185,8 @@ Test read_test(const std::string& key, const Place& place) {
     return any_matches(each(place, read_samples), [](const Draft& d, std::uint64_t samples) {
       return !d.cell.equal_lookups && d.cell.samples_per_ray == samples;
     });
-  return any_matches(each(place, [](const Place& at) { return at.positive(); }), [](const Draft& d, Real lookups) { return d.cell.equal_lookups == lookups; });
+  return any_matches(each(place, [](const Place& at) { return at.positive(); }),
+                     [](const Draft& d, Real lookups) { return d.cell.equal_lookups == lookups; });
 }
 
 }  // namespace

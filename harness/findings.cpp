@@ -42,7 +42,8 @@ class Comparer {
   static ClaimOutcome joint(const Items& items) {
     const auto is = [](ClaimOutcome word) { return [word](const auto& item) { return item.outcome == word; }; };
     if (std::any_of(items.begin(), items.end(), is(ClaimOutcome::refuted))) return ClaimOutcome::refuted;
-    return std::all_of(items.begin(), items.end(), is(ClaimOutcome::reproduced)) ? ClaimOutcome::reproduced : ClaimOutcome::cannot_tell;
+    return std::all_of(items.begin(), items.end(), is(ClaimOutcome::reproduced)) ? ClaimOutcome::reproduced
+                                                                                 : ClaimOutcome::cannot_tell;
   }
 
  private:
@@ -117,7 +118,7 @@ class Comparer {
     std::vector<std::pair<Real, Real>> points;
     for (const std::string& cell : part.cells) {
       const std::optional<Interval> of = measured(cell, part.metric, result.reason),
-                                   against = measured(cell, part.slope_against, result.reason);
+                                    against = measured(cell, part.slope_against, result.reason);
       if (!of || !against) return result;
       if (!(of->value > 0) || !(against->value > 0)) {
         result.reason = fmt::format("{} has no logarithm in {}", of->value > 0 ? part.slope_against : part.metric, cell);

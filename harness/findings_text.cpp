@@ -39,8 +39,10 @@ std::string relation_words(const ClaimPart& part) {
 
 std::string comparison_words(const ClaimPart& part, const ComparedCell& compared) {
   if (!compared.measured || !compared.expected) return compared.reason;
-  const std::string what = part.slope_against.empty() ? part.metric : fmt::format("slope of {} over {}", part.metric, part.slope_against);
-  std::string text = fmt::format("{} {}, {} {}", what, number(*compared.measured), relation_words(part), number(*compared.expected));
+  const std::string what =
+      part.slope_against.empty() ? part.metric : fmt::format("slope of {} over {}", part.metric, part.slope_against);
+  std::string text =
+      fmt::format("{} {}, {} {}", what, number(*compared.measured), relation_words(part), number(*compared.expected));
   if (compared.expected->value != 0 && part.slope_against.empty())
     text += fmt::format(" ({:.3g} times it)", compared.measured->value / compared.expected->value);
   return text;
@@ -56,8 +58,8 @@ const ComparedCell& most_telling(const PartFinding& part) {
 }
 
 std::size_t count(const PartFinding& part, ClaimOutcome outcome) {
-  return static_cast<std::size_t>(std::count_if(part.compared.begin(), part.compared.end(),
-                                                [&](const ComparedCell& one) { return one.outcome == outcome; }));
+  return static_cast<std::size_t>(
+      std::count_if(part.compared.begin(), part.compared.end(), [&](const ComparedCell& one) { return one.outcome == outcome; }));
 }
 
 }  // namespace
@@ -66,8 +68,9 @@ std::string findings_count(const std::vector<ClaimFinding>& all) {
   const auto of = [&](ClaimOutcome outcome) {
     return std::count_if(all.begin(), all.end(), [&](const ClaimFinding& one) { return one.outcome == outcome; });
   };
-  return fmt::format("{} claims: {} reproduced, {} refuted, {} cannot be told (at most {:g} of all runs show even one false word)",
-                     all.size(), of(ClaimOutcome::reproduced), of(ClaimOutcome::refuted), of(ClaimOutcome::cannot_tell), kFindingsLevel);
+  return fmt::format(
+      "{} claims: {} reproduced, {} refuted, {} cannot be told (at most {:g} of all runs show even one false word)", all.size(),
+      of(ClaimOutcome::reproduced), of(ClaimOutcome::refuted), of(ClaimOutcome::cannot_tell), kFindingsLevel);
 }
 
 std::string figures_of(const PartFinding& part) {
@@ -82,7 +85,8 @@ std::string figures_of(const PartFinding& part) {
   if (broken > 0) text += fmt::format(", {} do not", broken);
   const std::string words = comparison_words(*part.part, telling);
   if (!words.empty())
-    text += fmt::format("; {}: {}: {}", part.outcome == ClaimOutcome::reproduced ? "the closest" : "the worst", telling.cell, words);
+    text +=
+        fmt::format("; {}: {}: {}", part.outcome == ClaimOutcome::reproduced ? "the closest" : "the worst", telling.cell, words);
   return text;
 }
 

@@ -76,7 +76,8 @@ struct CanonicalMediumSource final : MediumSource {
   void parameters(ParameterVisitor& visit) override {
     visit.choice("profile", profile, {"constant", "linear", "trapezoid", "parabolic", "cosine", "gaussian_bump", "gaussian_hole"},
                  "f along z: 1, s, 1 + s, s^2, and the registered profiles at their defaults");
-    visit.choice("ramp", ramp, {"transmittance", "extinction"}, "what changes along x: T linearly, or a factor on f geometrically");
+    visit.choice("ramp", ramp, {"transmittance", "extinction"},
+                 "what changes along x: T linearly, or a factor on f geometrically");
     visit.number("from", from, Range::positive(), "", "T or factor at x = 0");
     visit.number("to", to, Range::positive(), "", "T or factor at x = 1");
     visit.number("length", length, Range::positive(), "length", "of the box along z");

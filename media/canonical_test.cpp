@@ -9,7 +9,8 @@
 namespace nullmark {
 namespace {
 
-std::shared_ptr<const Medium> canonical(const std::string& profile, const std::string& ramp, Real from, Real to, Real length = 1) {
+std::shared_ptr<const Medium> canonical(const std::string& profile, const std::string& ramp, Real from, Real to,
+                                        Real length = 1) {
   CanonicalMediumSource source;
   source.profile = profile;
   source.ramp = ramp;

@@ -9,7 +9,8 @@ namespace nullmark {
 /// maximum is that along the ray: the vertical axis of canonical maps.
 class RayMaximumMajorant final : public MajorantStructure {
  public:
-  RayMaximumMajorant(std::shared_ptr<const Medium> medium, Real from, Real to) : medium_(std::move(medium)), from_(from), to_(to) {
+  RayMaximumMajorant(std::shared_ptr<const Medium> medium, Real from, Real to)
+      : medium_(std::move(medium)), from_(from), to_(to) {
     const Affine to_world = medium_->world_to_local().inverse();
     diagonal_ = (to_world.linear() * medium_->bounds().extent()).norm();
     if (!std::isfinite(medium_->extrema(medium_->bounds()).maximum.maxCoeff()))
