@@ -177,13 +177,15 @@ Summary summarise(RunRecord& run) {
   summary.findings = findings(run);
   const bool disappointed = std::any_of(summary.expectations.begin(), summary.expectations.end(),
                                         [](const Expectation& one) { return one.measured && !one.met; });
+  const bool told = std::any_of(summary.findings.begin(), summary.findings.end(),
+                                [](const ClaimFinding& one) { return one.outcome != ClaimOutcome::cannot_tell; });
   if (summary.fail > 0 || order_failed || disappointed)
     summary.exit = ExitCode::bias_proven;
   else if (summary.errors > 0 || summary.altered > 0)
     summary.exit = ExitCode::internal_error;
-  else if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0)
+  else if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0 && !told)
     summary.exit = ExitCode::nothing_ran;
-  else if (summary.never_started > 0 || summary.unexpected_open > 0 || summary.pass == 0)
+  else if (summary.never_started > 0 || summary.unexpected_open > 0 || (summary.pass == 0 && !told))
     summary.exit = ExitCode::inconclusive;
   return summary;
 }

@@ -22,8 +22,8 @@ struct Summary {
 };
 
 /// Decides all verdicts again, in place, and counts them.  Exit code: FAIL or an expectation that was measured and not met 3;
-/// else errors 1; else nothing judged 5; else verdicts that are open although the plan foresaw a decision, cells never started,
-/// or no cell that passed 77; else 0.
+/// else errors 1; else nothing judged and no claim decided 5; else verdicts that are open although the plan foresaw a decision,
+/// cells never started, or neither a cell that passed nor a claim that is decided 77; else 0.
 Summary summarise(RunRecord& run);
 
 /// The word that `check` counts a cell by: "PASS", "INCONCLUSIVE (as planned)".
