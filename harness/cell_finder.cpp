@@ -6,13 +6,16 @@
 
 namespace nullmark {
 
+CellFinder::CellFinder(const Plan& plan, std::size_t first, std::span<const Draft> drafts, std::vector<std::string> experiments)
+    : plan_(&plan), first_(first), drafts_(drafts), experiments_(std::move(experiments)) {
+  for (const Cell& cell : plan.cells) names_.insert(cell.name);
+}
+
 std::string CellFinder::named(const Place& place) const {
   place.expect_keys({"cell"});
   const std::string wanted = place["cell"].string();
   if (!plan_) return wanted;
-  std::vector<std::string> names;
-  for (const Cell& cell : plan_->cells) names.push_back(cell.name);
-  if (std::find(names.begin(), names.end(), wanted) == names.end()) place["cell"].unknown("cell", wanted, names);
+  if (names_.count(wanted) == 0) place["cell"].unknown("cell", wanted, {names_.begin(), names_.end()});
   return wanted;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,8 +18,7 @@ class CellFinder {
   CellFinder() = default;
 
   /// Of a configuration file: `drafts` are its cells, which in the plan begin at `first`; `experiments` are the file's own names.
-  CellFinder(const Plan& plan, std::size_t first, std::span<const Draft> drafts, std::vector<std::string> experiments)
-      : plan_(&plan), first_(first), drafts_(drafts), experiments_(std::move(experiments)) {}
+  CellFinder(const Plan& plan, std::size_t first, std::span<const Draft> drafts, std::vector<std::string> experiments);
 
   /// Throws InputError where not exactly one fits.
   std::string one(const Place& place) const;
@@ -41,6 +41,7 @@ class CellFinder {
   std::size_t first_ = 0;
   std::span<const Draft> drafts_;
   std::vector<std::string> experiments_;
+  std::set<std::string> names_;  ///< of the plan's cells
 };
 
 }  // namespace nullmark

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <set>
 
 #include "harness/metrics.h"
 
@@ -25,12 +25,13 @@ Json compared_with(const ClaimPart& part) {
 }
 
 void read_compared_with(const Place& part, const Place& place, const CellFinder& finder, ClaimPart& out) {
-  if (place.json() == "theory") {
+  if (place.json() == "theory" && out.slope_against.empty()) {
     out.theory = true;
     return;
   }
   const bool number =
       place.json().is_number() || (place.json().is_array() && !place.json().empty() && place[0].json().is_number());
+  if (!number && !out.slope_against.empty()) place.expected("a number, which the slope is compared with");
   if (number)
     for (const Place& value : place.elements_or_self()) out.numbers.push_back(value.number());
   else
@@ -95,19 +96,19 @@ Json claims_json(const std::vector<PublishedClaim>& claims) {
   return list;
 }
 
-std::vector<PublishedClaim> read_claims(const Place& place, const CellFinder& finder) {
-  std::vector<PublishedClaim> claims;
+void read_claims(const Place& place, const CellFinder& finder, std::vector<PublishedClaim>& claims) {
+  std::set<std::string> ids;
+  for (const PublishedClaim& earlier : claims) ids.insert(earlier.id);
   for (const Place& entry : place.elements()) {
     entry.expect_keys({"id", "source", "claim", "note", "parts"});
     PublishedClaim claim{entry["id"].string(), entry["source"].string(), entry["claim"].string(), "", {}};
     if (entry.has("note")) claim.note = entry["note"].string();
-    for (const PublishedClaim& other : claims)
-      if (other.id == claim.id) entry["id"].fail(fmt::format("\"{}\" is the id of an earlier claim; expected another", claim.id));
+    if (!ids.insert(claim.id).second)
+      entry["id"].fail(fmt::format("\"{}\" is the id of an earlier claim; expected another", claim.id));
     for (const Place& part : entry["parts"].elements()) claim.parts.push_back(read_part(part, finder));
     if (claim.parts.empty()) entry["parts"].expected("at least one comparison");
     claims.push_back(std::move(claim));
   }
-  return claims;
 }
 
 }  // namespace nullmark

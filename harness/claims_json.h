@@ -7,7 +7,8 @@ namespace nullmark {
 /// The claims of a plan, cells by their names.
 Json claims_json(const std::vector<PublishedClaim>& claims);
 
-/// Claims of a configuration (format: config.md) or, with a finder that takes names as they are, of results.  Throws InputError.
-std::vector<PublishedClaim> read_claims(const Place& place, const CellFinder& finder);
+/// Adds the claims of a configuration (format: config.md) or, with a finder that takes names as they are, of results, to those of
+/// other files.  Throws InputError.
+void read_claims(const Place& place, const CellFinder& finder, std::vector<PublishedClaim>& claims);
 
 }  // namespace nullmark

@@ -72,6 +72,9 @@ TEST(Claims, WhatIsWrongIsNamedWithItsPlace) {
   says(R"(,"metric":"variance","at_most":[1,2,3])", "found 3 to compare with; expected 2");
   says(R"(,"metric":"variance","at_most":{"estimator":["delta","residual_ratio"]})", "counterparts of");
   says(R"(,"unbiased":true,"metric":"mean")", "does not apply");
+  // A slope has no theory and no counterpart; there would be no number to compare it with.
+  says(R"(,"metric":"mean","slope_against":"samples_per_ray","at_most":"theory")", "expected a number");
+  says(R"(,"metric":"mean","slope_against":"samples_per_ray","at_most":{"estimator":"delta"})", "expected a number");
   says(R"(,"unbiased":false)", "expected true");
   EXPECT_NE(error_of(claim(R"({"metric":"mean","cells":{"experiment":"g"},"at_most":1})")).find("unknown experiment"),
             std::string::npos);

@@ -180,19 +180,6 @@ void tell_experiments_apart(std::vector<DraftPlan>& files) {
     }
 }
 
-template <class Item>
-void append(std::vector<Item>& list, std::vector<Item> items) {
-  std::move(items.begin(), items.end(), std::back_inserter(list));
-}
-
-void refuse_claims_made_twice(const Plan& plan, const std::vector<DraftPlan>& files) {
-  std::set<std::string> ids;
-  for (const PublishedClaim& claim : plan.claims)
-    if (!ids.insert(claim.id).second)
-      throw InputError(fmt::format("{}: claim \"{}\" stands in another file as well; expected another \"id\"",
-                                   files.back().file, claim.id));
-}
-
 }  // namespace
 
 Plan read_config(const std::string& text, const std::string& file, std::optional<std::uint64_t> seed) {
@@ -225,11 +212,11 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
   for (const DraftPlan& file : files) {
     const Place top(file.json, file.file);
     const CellFinder finder(plan, first, file.cells, file.experiments);
-    if (top.has("tables")) append(plan.tables, read_tables(top["tables"], finder));
-    if (top.has("claims")) append(plan.claims, read_claims(top["claims"], finder));
+    if (top.has("tables"))
+      for (Table& table : read_tables(top["tables"], finder)) plan.tables.push_back(std::move(table));
+    if (top.has("claims")) read_claims(top["claims"], finder, plan.claims);
     first += file.cells.size();
   }
-  refuse_claims_made_twice(plan, files);
   plan.config_text = applied_config(plan);
   return plan;
 }

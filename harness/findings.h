@@ -40,8 +40,9 @@ inline constexpr Real kFindingsLevel = 1e-3;
 /// hold together with probability 1 - kFindingsLevel (Bonferroni); a comparison is reproduced where both whole intervals bear it
 /// out, refuted where none of them does, and open otherwise.  A part is reproduced where all its cells are, refuted where one is;
 /// a claim likewise by its parts. `unbiased` parts go by the verdicts of cells, which summarise() derives.  Intervals of measured
-/// variances rest on the sample kurtosis; where it says that the variance is not known to a quarter, nothing is concluded.  Intervals of slopes are Student's at 95 %,
-/// widened by the ratio of normal quantiles, which is less than the level asks of few points.
+/// variances rest on the sample kurtosis; where it says that the variance is not known to a quarter, nothing is concluded.
+/// Intervals of slopes are Student's at 95 %, widened by the ratio of normal quantiles, which is less than the level asks of few
+/// points.
 std::vector<ClaimFinding> findings(const RunRecord& run);
 
 }  // namespace nullmark

@@ -421,7 +421,7 @@ RunRecord read_results(const std::string& text, const std::string& file) {
   for (const auto& [key, value] : top["provenance"].json().items()) run.provenance[key] = value.dump();
   for (const Place& cell : top["cells"].elements()) run.cells.push_back(read_cell(cell));
   if (top.has("tables")) run.tables = read_tables(top["tables"], CellFinder());
-  if (top.has("claims")) run.claims = read_claims(top["claims"], CellFinder());
+  if (top.has("claims")) read_claims(top["claims"], CellFinder(), run.claims);
   return run;
 }
 
