@@ -1,6 +1,6 @@
 #pragma once
 
-#include <set>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,7 +31,11 @@ class CellFinder {
   /// InputError where there is not exactly one.
   std::vector<std::string> counterparts(const Place& of, const Place& place) const;
 
+  /// Whether the cell of a name gets a verdict; true where only results know.
+  bool is_judged(const std::string& name) const;
+
  private:
+  [[noreturn]] void matches_none(const Place& place, const char* expected) const;
   std::vector<std::size_t> matching(const Place& place) const;
   std::string named(const Place& place) const;
   std::string described(std::size_t draft) const;
@@ -41,7 +45,7 @@ class CellFinder {
   std::size_t first_ = 0;
   std::span<const Draft> drafts_;
   std::vector<std::string> experiments_;
-  std::set<std::string> names_;  ///< of the plan's cells
+  std::map<std::string, bool> judged_;  ///< whether the plan's cell of a name has its gate on
 };
 
 }  // namespace nullmark

@@ -40,6 +40,9 @@ void read_compared_with(const Place& part, const Place& place, const CellFinder&
   const std::size_t wanted = out.slope_against.empty() ? out.cells.size() : 1;
   if (count != wanted && !(number && count == 1))
     place.fail(fmt::format("found {} to compare with; expected {}, one for each of \"cells\"", count, wanted));
+  for (std::size_t i = 0; i < out.others.size(); ++i)
+    if (out.others[i] == out.cells[i])
+      place.fail(fmt::format("\"{}\" would be compared with itself; expected another cell", out.cells[i]));
 }
 
 ClaimPart read_part(const Place& place, const CellFinder& finder) {
@@ -49,7 +52,12 @@ ClaimPart read_part(const Place& place, const CellFinder& finder) {
   ClaimPart part;
   if (place.has("says")) part.says = place["says"].string();
   part.cells = finder.all(place["cells"]);
-  if (place.has("slope_against")) part.slope_against = place["slope_against"].one_of(metric_names(), "metric");
+  if (place.has("slope_against")) {
+    part.slope_against = place["slope_against"].one_of(metric_names(), "metric");
+    if (part.cells.size() < 3)
+      place["cells"].fail(
+          fmt::format("matches {} cells; expected three or more, through which a slope has an error", part.cells.size()));
+  }
   if (place.has("factor")) part.factor = place["factor"].number();
   if (place.has("tolerance")) part.tolerance = place["tolerance"].positive();
 
@@ -62,6 +70,9 @@ ClaimPart read_part(const Place& place, const CellFinder& finder) {
     if (!place["unbiased"].boolean()) place["unbiased"].expected("true");
     for (const char* other : {"metric", "factor", "tolerance", "slope_against"})
       if (place.has(other)) place[other].fail("does not apply to \"unbiased\"");
+    for (const std::string& cell : part.cells)
+      if (!finder.is_judged(cell))
+        place["cells"].fail(fmt::format("\"{}\" gets no verdict; expected its \"gate\" to be enabled", cell));
     return part;
   }
   part.metric = place["metric"].one_of(metric_names(), "metric");

@@ -13,7 +13,8 @@ std::string config(const std::string& claims) {
     {"name":"e","rays":"single","samples_per_ray":10,
      "matrix":{"estimator":["ratio","delta",{"type":"residual_ratio","control":["minimum","average"],"rate_scale":[1,2]}],
                "medium":["linear","cosine"]}},
-    {"name":"f","rays":"single","samples_per_ray":[10],"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}],
+    {"name":"f","rays":"single","samples_per_ray":10,"matrix":{"estimator":["ratio","delta"],"medium":"linear"}},
+    {"name":"unjudged","rays":"single","samples_per_ray":10,"gate":{"enabled":false},"estimator":"ratio","include":[{"medium":"linear"}]}],
     "claims":[)" +
          claims + "]}";
 }
@@ -70,12 +71,27 @@ TEST(Claims, WhatIsWrongIsNamedWithItsPlace) {
   says(R"(,"metric":"variance","near":1)", "\"tolerance\" beside \"near\"");
   says(R"(,"metric":"variance","at_most":1,"tolerance":1)", "\"tolerance\" beside \"near\"");
   says(R"(,"metric":"variance","at_most":[1,2,3])", "found 3 to compare with; expected 2");
-  says(R"(,"metric":"variance","at_most":{"estimator":["delta","residual_ratio"]})", "counterparts of");
+  says(R"(,"metric":"variance","at_most":{"estimator":["delta","residual_ratio"]})", "expected a pattern that tells them apart");
+  says(R"(,"metric":"variance","at_most":{"estimator":"weighted_delta"})", "there is none of this \"estimator\"");
+  says(R"(,"metric":"variance","at_most":{"estimator":"delta","precision":"float"})", "there is none of this \"precision\"");
+  says(R"(,"metric":"variance","at_most":{"experiment":"unjudged"})", "finds no counterpart of");
+  says(R"(,"metric":"variance","at_most":{"estimator":"ratio"})", "would be compared with itself");
   says(R"(,"unbiased":true,"metric":"mean")", "does not apply");
   // A slope has no theory and no counterpart; there would be no number to compare it with.
-  says(R"(,"metric":"mean","slope_against":"samples_per_ray","at_most":"theory")", "expected a number");
-  says(R"(,"metric":"mean","slope_against":"samples_per_ray","at_most":{"estimator":"delta"})", "expected a number");
+  const auto slope = [&](const std::string& experiment, const std::string& against) {
+    return error_of(claim(R"({"metric":"mean","cells":{"experiment":")" + experiment +
+                          R"("},"slope_against":"samples_per_ray","at_most":)" + against + "}"));
+  };
+  EXPECT_EQ(slope("e", "1"), "no error");
+  EXPECT_NE(slope("e", "\"theory\"").find("expected a number"), std::string::npos);
+  EXPECT_NE(slope("e", R"({"estimator":"delta"})").find("expected a number"), std::string::npos);
+  EXPECT_NE(slope("f", "1").find("matches 2 cells; expected three or more"), std::string::npos);
   says(R"(,"unbiased":false)", "expected true");
+  EXPECT_NE(error_of(claim(R"({"cells":{"experiment":"unjudged"},"unbiased":true})")).find("expected its \"gate\" to be enabled"),
+            std::string::npos);
+  EXPECT_NE(error_of(claim(R"({"metric":"mean","cells":{"experiment":"f","medium":"cosine"},"at_most":1})"))
+                .find("none of this \"medium\""),
+            std::string::npos);
   EXPECT_NE(error_of(claim(R"({"metric":"mean","cells":{"experiment":"g"},"at_most":1})")).find("unknown experiment"),
             std::string::npos);
   EXPECT_NE(error_of(claim(R"({"metric":"mean","cells":{"estimator":"weighted_delta"},"at_most":1})")).find("matches no cell"),

@@ -7,6 +7,7 @@
 #include <array>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
@@ -82,6 +83,9 @@ void rank(std::vector<Contender>& contenders) {
                        return has_time(other) && quotient(*contender.seconds[0], *other.seconds[0]).low > 1;
                      });
   }
+  const auto place = [](const Contender& contender) { return contender.rank.value_or(std::numeric_limits<std::size_t>::max()); };
+  std::stable_sort(contenders.begin(), contenders.end(),
+                   [&](const Contender& a, const Contender& b) { return place(a) < place(b); });
   for (Contender& contender : contenders)
     contender.tied = contender.rank && std::count_if(contenders.begin(), contenders.end(),
                                                      [&](const Contender& other) { return other.rank == contender.rank; }) > 1;

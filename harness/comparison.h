@@ -47,7 +47,7 @@ struct Unpaired {
 /// Cells that differ in nothing but the tracker (its precision and seed included), by time to the first target.
 struct Contest {
   std::string name, quantity, medium, majorant, rays, light, measurement;
-  std::vector<Contender> contenders;         ///< those without a rank last
+  std::vector<Contender> contenders;         ///< by rank, then by time; those without a rank last
   std::optional<std::size_t> baseline;       ///< the first that is unbiased, or the one asked for
   std::optional<std::size_t> best_unbiased;  ///< least variance x time among those that claim to be unbiased and vary
   std::vector<Pairing> pairings;             ///< of all others with the baseline, where their streams are the same
