@@ -139,6 +139,19 @@ TEST(Comparison, TiesAreTimesWhoseRatioMayBeOne) {
   EXPECT_NEAR(contest.contenders[3].relative->value / contest.contenders[1].relative->value, 2, 1e-12);
 }
 
+/// One whose time is hardly known is tied with the first, and stands before those that are proven slower.
+TEST(Comparison, RanksRise) {
+  CellRecord vague = cell("vague", 0.04, 30);
+  vague.time->repetition_ns = {1, 30, 59};
+  const Contest contest = only_contest({vague, cell("slow", 0.04, 20), cell("fast", 0.04, 10)});
+  ASSERT_EQ(contest.contenders.size(), 3u);
+  EXPECT_EQ(contest.contenders[0].label, "fast");
+  EXPECT_EQ(contest.contenders[1].label, "vague");
+  EXPECT_EQ(*contest.contenders[1].rank, 1u);
+  EXPECT_TRUE(contest.contenders[0].tied && contest.contenders[1].tied);
+  EXPECT_EQ(*contest.contenders[2].rank, 2u);
+}
+
 TEST(Comparison, BaselinesAreTheFirstUnbiasedOrTheOneNamed) {
   std::vector<CellRecord> cells = {cell("delta", 0.1), cell("ratio"), marching(0.002)};
   EXPECT_EQ(only_contest(cells).contenders[*only_contest(cells).baseline].label, "ratio");

@@ -180,6 +180,14 @@ void tell_experiments_apart(std::vector<DraftPlan>& files) {
     }
 }
 
+/// Short enough for a heading.
+std::string joint_name(const std::vector<DraftPlan>& files) {
+  std::string name = files[0].name;
+  if (files.size() > 3) return fmt::format("{} and {} more", name, files.size() - 1);
+  for (std::size_t i = 1; i < files.size(); ++i) name += fmt::format("+{}", files[i].name);
+  return name;
+}
+
 }  // namespace
 
 Plan read_config(const std::string& text, const std::string& file, std::optional<std::uint64_t> seed) {
@@ -195,9 +203,9 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
   Plan plan;
   plan.timing = files.front().timing;
   plan.levels = files.front().levels;
+  plan.name = joint_name(files);
   PlanBuilder builder(plan);
   for (const DraftPlan& file : files) {
-    plan.name += (plan.name.empty() ? "" : "+") + file.name;
     if (!agree(file.timing, plan.timing))
       throw InputError(fmt::format("{}: /timing: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
