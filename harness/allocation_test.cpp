@@ -146,16 +146,15 @@ TEST(Allocation, NoneWhileTransmittancesAndFreePathsAreSampled) {
   std::map<std::string, int> tried;
   for (Place& place : places()) {
     const int channels = place.scene.medium->medium->channels();
-    for (const EstimatorEntry& entry : Registry<EstimatorEntry>::instance().entries()) {
-      const auto source = entry.make();
-      const auto kernel = source->kernel(channels);
-      if (!fits(*source, *kernel, *place.scene.medium, *place.scene.rays)) continue;
-      for (const Quantity quantity :
-           {Quantity::transmittance, Quantity::optical_depth, Quantity::transmittance_profile, Quantity::free_path}) {
-        if (!kernel->answers(quantity)) continue;
-        place.scene.marks = nullptr;
-        if (quantity == Quantity::transmittance_profile || quantity == Quantity::free_path)
-          place.scene.marks = std::make_shared<const Marks>(compute_marks(*place.scene.medium, *place.scene.rays, quantity));
+    for (const Quantity quantity :
+         {Quantity::transmittance, Quantity::optical_depth, Quantity::transmittance_profile, Quantity::free_path}) {
+      place.scene.marks = nullptr;
+      if (quantity == Quantity::transmittance_profile || quantity == Quantity::free_path)
+        place.scene.marks = std::make_shared<const Marks>(compute_marks(*place.scene.medium, *place.scene.rays, quantity));
+      for (const EstimatorEntry& entry : Registry<EstimatorEntry>::instance().entries()) {
+        const auto source = entry.make();
+        const auto kernel = source->kernel(channels);
+        if (!fits(*source, *kernel, *place.scene.medium, *place.scene.rays) || !kernel->answers(quantity)) continue;
         EXPECT_EQ(allocations_of(*kernel, place.scene, quantity), 0u)
             << entry.name << ", quantity " << static_cast<int>(quantity) << ", " << place.name;
         ++tried[entry.name];

@@ -90,9 +90,13 @@ TEST(Configs, Seed003RelationsAreMet) {
   }
 }
 
-/// Kozelj's Table 1: corrected within 2 % of theory at 256 x 256, as published within 4 % of the printed values at 400 x 400.
+/// Kozelj's Table 1: corrected within 2 % of theory at 256 x 256, as published within 4 % of the printed values; that picture has a
+/// quarter of its pixels here, which leaves its errors what they are (claim C09 has all of them).
 TEST(Configs, Seed004TableIsReproducedAndCorrected) {
-  const auto records = run_untimed(shipped("seed_004_table1.json"));
+  Plan plan = shipped("seed_004_table1.json");
+  for (Component& rays : plan.ray_sets)
+    if (rays.values.at("width") == ParameterValue(400)) rays.values["width"] = rays.values["height"] = 200;
+  const auto records = run_untimed(plan);
   struct Row {
     const char *published_estimator, *estimator;
     Real published, theory;
