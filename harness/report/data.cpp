@@ -369,10 +369,9 @@ std::string command_line(const Json& provenance) {
   return line;
 }
 
-Json run_json(RunRecord& run, const std::string& file) {
+Json run_json(const RunRecord& run, const Summary& summary, const std::string& file) {
   Json provenance = Json::object();
   for (const auto& [key, text] : run.provenance) provenance[key] = Json::parse(text);
-  const Summary summary = summarise(run);
   const std::string name = std::filesystem::path(file).filename().string();
   return {{"name", run.name},
           {"file", name},
@@ -408,7 +407,8 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
   json["claims"] = Json::array();
   for (std::size_t run = 0; run < runs.size(); ++run) {
     title += (title.empty() ? "" : " + ") + runs[run].name;
-    json["runs"].push_back(run_json(runs[run], files[run]));
+    const Summary summary = summarise(runs[run]);
+    json["runs"].push_back(run_json(runs[run], summary, files[run]));
     shown.merge(credits(runs[run]));
     for (const CellRecord& record : runs[run].cells) {
       places[&record] = json["cells"].size();
@@ -416,7 +416,7 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
     }
     const CellsByName cells = cells_by_name(runs[run]);
     for (const Table& table : runs[run].tables) json["tables"].push_back(table_json(table, cells, places));
-    for (const ClaimFinding& finding : findings(runs[run])) json["claims"].push_back(claim_json(finding, cells, places));
+    for (const ClaimFinding& finding : summary.findings) json["claims"].push_back(claim_json(finding, cells, places));
   }
   const std::vector<Contest> all = contests(runs, baseline);
   json["scenes"] = Json::array();

@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "media/majorants/medium_bounds.h"
+
 namespace nullmark {
 
 BoundLattice::BoundLattice(const Medium& medium, const std::array<int, 3>& resolution)
@@ -33,9 +35,7 @@ BoundLattice::BoundLattice(const Medium& medium, const std::array<int, 3>& resol
       }
     }
   });
-  for (const Real rate : rate_)
-    if (!std::isfinite(rate))
-      throw ParameterError("type", "the medium's extinction has no finite bound; use the majorant \"prescribed\"");
+  for (const Real rate : rate_) expect_finite(rate);
 }
 
 Real BoundLattice::plane(std::size_t axis, int index) const {

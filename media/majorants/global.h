@@ -1,5 +1,6 @@
 #pragma once
 
+#include "media/majorants/medium_bounds.h"
 #include "media/registry.h"
 
 namespace nullmark {
@@ -9,11 +10,10 @@ namespace nullmark {
 class GlobalMajorant final : public MajorantStructure {
  public:
   GlobalMajorant(const Medium& medium, Real looseness)
-      : extinction_(medium.extrema(medium.bounds())), majorant_(looseness * extinction_.maximum.maxCoeff()) {
-    if (!std::isfinite(majorant_))
-      throw ParameterError("type", "the medium's extinction has no finite bound; use the majorant \"prescribed\"");
-    const Affine to_world = medium.world_to_local().inverse();
-    diagonal_ = (to_world.linear() * medium.bounds().extent()).norm();
+      : extinction_(medium.extrema(medium.bounds())),
+        majorant_(looseness * extinction_.maximum.maxCoeff()),
+        diagonal_(world_diagonal(medium, medium.bounds().extent())) {
+    expect_finite(majorant_);
   }
 
   void segments(const Ray& world, const Ray&, SegmentBuffer& out) const override {
@@ -25,7 +25,7 @@ class GlobalMajorant final : public MajorantStructure {
 
  private:
   Extrema extinction_;
-  Real majorant_, diagonal_ = 0;
+  Real majorant_, diagonal_;
 };
 
 struct GlobalMajorantSource final : MajorantSource {

@@ -2,12 +2,14 @@
 
 #include <tbb/parallel_for.h>
 
+#include "media/majorants/medium_bounds.h"
+
 namespace nullmark {
 
 GridMajorant::GridMajorant(const Medium& medium, const std::array<int, 3>& resolution, Real looseness, Crossing crossing)
     : resolution_(resolution), looseness_(looseness), crossing_(crossing), box_(medium.bounds()) {
   const Vec3 size = box_.extent().cwiseQuotient(Vec3(resolution[0], resolution[1], resolution[2]));
-  diagonal_ = (medium.world_to_local().inverse().linear() * size).norm();
+  diagonal_ = world_diagonal(medium, size);
   cells_.resize(static_cast<std::size_t>(resolution[0]) * static_cast<std::size_t>(resolution[1]) *
                 static_cast<std::size_t>(resolution[2]));
   // A point that rounding puts into the neighbouring cell must still be bounded.
@@ -20,9 +22,7 @@ GridMajorant::GridMajorant(const Medium& medium, const std::array<int, 3>& resol
             medium.extrema({lo - margin, lo + size + margin});
       }
   });
-  for (const Extrema& cell : cells_)
-    if (!std::isfinite(cell.maximum.maxCoeff()))
-      throw ParameterError("type", "the medium's extinction has no finite bound; use the majorant \"prescribed\"");
+  for (const Extrema& cell : cells_) expect_finite(cell.maximum.maxCoeff());
 }
 
 void GridMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& out) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "media/majorants/medium_bounds.h"
 #include "media/registry.h"
 
 namespace nullmark {
@@ -9,9 +10,11 @@ namespace nullmark {
 class PrescribedMajorant final : public MajorantStructure {
  public:
   PrescribedMajorant(const Medium& medium, Real value, const Vec3& gradient)
-      : extinction_(medium.extrema(medium.bounds())), value_(value), gradient_(gradient) {
+      : extinction_(medium.extrema(medium.bounds())),
+        value_(value),
+        gradient_(gradient),
+        diagonal_(world_diagonal(medium, medium.bounds().extent())) {
     const Affine to_world = medium.world_to_local().inverse();
-    diagonal_ = (to_world.linear() * medium.bounds().extent()).norm();
     const Box box = medium.bounds();
     for (int corner = 0; corner < 8; ++corner) {
       const Vec3 p(corner & 1 ? box.hi.x() : box.lo.x(), corner & 2 ? box.hi.y() : box.lo.y(),
@@ -36,7 +39,7 @@ class PrescribedMajorant final : public MajorantStructure {
   Extrema extinction_;
   Real value_;
   Vec3 gradient_;
-  Real diagonal_ = 0;
+  Real diagonal_;
 };
 
 struct PrescribedMajorantSource final : MajorantSource {

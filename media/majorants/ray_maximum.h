@@ -1,5 +1,6 @@
 #pragma once
 
+#include "media/majorants/medium_bounds.h"
 #include "media/registry.h"
 
 namespace nullmark {
@@ -10,11 +11,8 @@ namespace nullmark {
 class RayMaximumMajorant final : public MajorantStructure {
  public:
   RayMaximumMajorant(std::shared_ptr<const Medium> medium, Real from, Real to)
-      : medium_(std::move(medium)), from_(from), to_(to) {
-    const Affine to_world = medium_->world_to_local().inverse();
-    diagonal_ = (to_world.linear() * medium_->bounds().extent()).norm();
-    if (!std::isfinite(medium_->extrema(medium_->bounds()).maximum.maxCoeff()))
-      throw ParameterError("type", "the medium's extinction has no finite bound; use the majorant \"prescribed\"");
+      : medium_(std::move(medium)), from_(from), to_(to), diagonal_(world_diagonal(*medium_, medium_->bounds().extent())) {
+    expect_finite(medium_->extrema(medium_->bounds()).maximum.maxCoeff());
   }
 
   void segments(const Ray& world, const Ray& local, SegmentBuffer& out) const override {
@@ -32,7 +30,7 @@ class RayMaximumMajorant final : public MajorantStructure {
 
  private:
   std::shared_ptr<const Medium> medium_;
-  Real from_, to_, diagonal_ = 0;
+  Real from_, to_, diagonal_;
 };
 
 struct RayMaximumSource final : MajorantSource {
