@@ -30,7 +30,7 @@ std::vector<Real> combs(const RayProfile& profile, int c, Real steps, const std:
   const Real h = (profile.end() - profile.begin()) / steps;
   std::vector<Real> t;
   for (const Real o : offsets)
-    for (Real i = 0; i < steps; ++i) t.push_back(profile.begin() + (i + o) * h);
+    for (int i = 0; i < steps; ++i) t.push_back(profile.begin() + (i + o) * h);
   return extinction_at(profile, c, t);
 }
 

@@ -23,7 +23,11 @@ void PoissonTail::set_up(Real mean) {
     tail_.push_back(term);
   }
   Real tail = 0;
-  for (Real beyond = term * (mean / ++k); beyond > 1e-17 * term; beyond *= mean / ++k) tail += beyond;
+  Real beyond = term * (mean / ++k);
+  while (beyond > 1e-17 * term) {
+    tail += beyond;
+    beyond *= mean / ++k;
+  }
   for (std::size_t i = tail_.size(); i-- > 0;) {
     tail += tail_[i];
     tail_[i] = tail;
@@ -54,14 +58,16 @@ std::optional<Real> series_variance(Real depth, Real first, const std::function<
   if (first < kLeast || !(last - begin < kMostTerms)) return std::nullopt;
   if (first == 0) return 0;
   Real log_term = last * std::log(std::abs(first)) - depth - log_factorial(last), following = 1, variance = 0;
-  for (Real i = last; i >= begin; --i) {
-    const Real ahead = 1 + first / (i + 1) * following, growth = log_growth(static_cast<std::int64_t>(i));
+  const auto least = static_cast<std::int64_t>(begin);
+  for (auto i = static_cast<std::int64_t>(last); i >= least; --i) {
+    const auto order = static_cast<Real>(i);
+    const Real ahead = 1 + first / (order + 1) * following, growth = log_growth(i);
     // Where it grows much its logarithm may not fit alone.
     const Real square = std::exp(2 * log_term);
     const Real more = growth < 1 ? square * std::expm1(growth) : std::exp(growth + 2 * log_term) - square;
     variance += more * (2 * ahead - 1);
     following = ahead;
-    log_term -= std::log(std::abs(first) / i);
+    log_term -= std::log(std::abs(first) / order);
   }
   return std::max<Real>(0, variance);
 }

@@ -13,7 +13,7 @@ CellFinder::CellFinder(const Plan& plan, std::size_t first, std::span<const Draf
 
 std::string CellFinder::named(const Place& place) const {
   place.expect_keys({"cell"});
-  const std::string wanted = place["cell"].string();
+  std::string wanted = place["cell"].string();
   if (!plan_) return wanted;
   if (judged_.count(wanted) == 0) {
     std::vector<std::string> names;

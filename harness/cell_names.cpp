@@ -47,6 +47,7 @@ void add_experiments_where_needed(Plan& plan) {
 
 void add_distinctions(const Plan& plan, const std::vector<Cell*>& cells) {
   std::vector<std::array<std::string, 7>> words;
+  words.reserve(cells.size());
   for (const Cell* cell : cells) words.push_back(distinctions(plan, *cell));
   for (std::size_t i = 0; i < words[0].size(); ++i) {
     if (std::all_of(words.begin(), words.end(), [&](const auto& own) { return own[i] == words[0][i]; })) continue;

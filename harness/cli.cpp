@@ -52,6 +52,7 @@ ExitCode report(ExitCode code, const std::string& message) {
 
 std::vector<RunRecord> load_all(const std::vector<std::string>& files) {
   std::vector<RunRecord> runs;
+  runs.reserve(files.size());
   for (const std::string& file : files) runs.push_back(read_results(read_file(file), file));
   return runs;
 }
