@@ -120,6 +120,7 @@ class Flight {
   /// int rate from the ray's begin to the position, and from the position to the ray's end.
   Real depth() const { return depth_; }
   Real depth_left() const { return rates_->total_depth() - depth_; }
+  Real total_depth() const { return rates_->total_depth(); }
 
  private:
   /// Cuts a flight to `depth` at the end of its cell, and others after it, until one ends inside its cell or the ray is left.

@@ -72,6 +72,11 @@ class LaneFlight {
       rng.go_on(rewound.stream, rewound.draws);
       return rewound.inside;
     }
+    return advance_to(depth, alive);
+  }
+
+  /// Moves forwards to points of the given depths; false (and the ray's end) for lanes whose ray is not that deep.
+  [[gnu::always_inline]] Mask advance_to(Pack depth, Mask alive = true) {
     const Mask inside = alive & (depth < Pack(course_.total_));
     at_.depth = depth;
     if (course_.last_ > 0) {
@@ -92,6 +97,7 @@ class LaneFlight {
   Pack rate() const { return course_.rate(at_.piece); }
   Pack depth() const { return at_.depth; }
   Pack depth_left() const { return Pack(course_.total_) - at_.depth; }
+  Pack total_depth() const { return course_.total_; }
 
  private:
   struct Rewound {

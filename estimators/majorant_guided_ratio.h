@@ -23,6 +23,7 @@ struct MajorantGuidedRatio {
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kLanes = true;
 
   std::string start = "majorant";
 
@@ -37,27 +38,27 @@ struct MajorantGuidedRatio {
 
   struct Walk {
     Value weight;
-    Real rate = 1;  ///< q
-    bool started = false;
+    Distance<Value> rate;     ///< q
+    Truth<Value> has_looked;  ///< that the ray's begin has been looked up, or need not be: of all walks in lanes or of none
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), 1, start == "majorant"}; }
+  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(1), 1, start == "majorant"}; }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
-    if (!walk.started) return flight.advance_to(0);
-    const Real before = flight.depth(), total = ray.majorant.total_depth();
-    const bool inside = flight.advance_to(before + rng.exponential() / walk.rate);
-    walk.weight *= exponential((walk.rate - 1) * (std::min(flight.depth(), total) - before));
+  auto propose(Walk& walk, const auto&, auto& flight, auto& rng) const {
+    if (!none(!walk.has_looked)) return flight.advance_to(0);
+    const Distance<Value> before = flight.depth();
+    const auto inside = flight.advance_to(before + rng.exponential() / walk.rate);
+    walk.weight *= exponential((walk.rate - 1) * (smaller(flight.depth(), flight.total_depth()) - before));
     return inside;
   }
 
-  void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto&) const {
-    if (walk.started) walk.weight *= (at.rate() - extinction) / (at.rate() * walk.rate);
-    walk.rate = std::max(kLeastRate, (at.rate() - smallest(extinction)) / at.rate());
-    walk.started = true;
+  void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
+    if (none(!walk.has_looked)) walk.weight *= (at.rate() - extinction) / (at.rate() * walk.rate);
+    walk.rate = larger(kLeastRate, (at.rate() - smallest(extinction)) / at.rate());
+    walk.has_looked = true;
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+  Value result(const Walk& walk, const auto&) const { return walk.weight; }
 
   Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     return guided_moments(ray.majorant, profile, c, kLeastRate, start == "lookup");

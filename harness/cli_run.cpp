@@ -177,6 +177,7 @@ Earlier earlier_results(const Plan& plan, const std::string& output, const Journ
 /// Files that the run reads: configurations and the volumes of its media.
 std::vector<std::string> inputs_of(const std::vector<ConfigSource>& sources, const Plan& plan) {
   std::vector<std::string> files;
+  files.reserve(sources.size());
   for (const ConfigSource& source : sources) files.push_back(source.file);
   const std::function<void(const MediumSpec&)> add = [&](const MediumSpec& medium) {
     if (const auto file = medium.field.values.find("file"); file != medium.field.values.end())

@@ -87,6 +87,7 @@ std::vector<Spec> crossed(const Place& place, const std::vector<Spec>& specs, co
 
 std::vector<std::string> names_of(const std::vector<ComponentInfo>& entries) {
   std::vector<std::string> names;
+  names.reserve(entries.size());
   for (const ComponentInfo& entry : entries) names.push_back(entry.name);
   return names;
 }

@@ -172,7 +172,7 @@ void tell_experiments_apart(std::vector<DraftPlan>& files) {
   for (std::size_t i = 0; i < files.size(); ++i)
     for (Draft& draft : files[i].cells) {
       std::string& name = draft.cell.experiment;
-      if (owners[name].size() > 1) name = files[i].name + "." + name;
+      if (owners[name].size() > 1) name = fmt::format("{}.{}", files[i].name, name);
       if (const auto [at, added] = taken.emplace(name, i); !added && at->second != i)
         throw InputError(
             fmt::format("{}: experiment \"{}\" stands in {} as well; expected another \"name\" of the file or experiment",
@@ -196,6 +196,7 @@ Plan read_config(const std::string& text, const std::string& file, std::optional
 
 Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::uint64_t> seed) {
   std::vector<DraftPlan> files;
+  files.reserve(sources.size());
   for (const ConfigSource& source : sources) files.push_back(read_file(source, seed));
   if (files.empty()) throw InputError("found no configuration; expected at least one file");
   tell_experiments_apart(files);

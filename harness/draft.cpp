@@ -70,6 +70,7 @@ GivenReference read_reference(const Place& place) {
 template <class Value, class Set>
 std::vector<Setter> setters(const std::vector<Value>& values, Set set) {
   std::vector<Setter> result;
+  result.reserve(values.size());
   for (const Value& value : values) result.push_back([value, set](Draft& draft) { set(draft, value); });
   return result;
 }

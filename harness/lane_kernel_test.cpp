@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "estimators/delta.h"
+#include "estimators/majorant_guided_ratio.h"
 #include "estimators/mis_unidirectional.h"
 #include "estimators/next_flight_delta.h"
 #include "estimators/next_flight_ratio.h"
@@ -163,6 +164,10 @@ TEST(Lanes, UnidirectionalMisIsTheSameAtEveryWidth) { compare_widths<Unidirectio
 TEST(Lanes, NextFlightDeltaTrackingIsTheSameAtEveryWidth) {
   compare_widths<NextFlightDeltaTracking>(kAsItIs);
   compare_widths<NextFlightDeltaTracking>([](auto& estimator) { estimator.variant = "b"; });
+}
+TEST(Lanes, MajorantGuidedRatioTrackingIsTheSameAtEveryWidth) {
+  for (const char* start : {"majorant", "lookup"})
+    compare_widths<MajorantGuidedRatio>([&](auto& estimator) { estimator.start = start; });
 }
 TEST(Lanes, ResidualDeltaTrackingIsTheSameAtEveryWidth) { compare_widths<ResidualDeltaTracking>(kAsItIs); }
 TEST(Lanes, ResidualRatioTrackingIsTheSameAtEveryWidth) {
