@@ -88,7 +88,8 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
   void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
     State& state = static_cast<State&>(workspace);
-    if (!kSingle && (state.recording || !in_lanes(quantity)))
+    // One walk would leave all lanes but its own idle.
+    if (!kSingle && (state.recording || !in_lanes(quantity) || count == 1))
       return Base::sample(workspace, medium, context, key, first, count, quantity, out, counters);
     out.values.resize(count);
     out.lookups.resize(count);

@@ -208,11 +208,15 @@ TEST(Lanes, AnEmptyRayIsPassed) {
 /// Samples of lanes are addressed: any cut of a run gives the same.
 TEST(Lanes, SamplesDoNotDependOnTheirNeighbours) {
   const Case with = cases()[4];
-  const auto kernel = EstimatorTemplate<NextFlightRatioTracking>().kernel(1, Precision::float32);
-  const Sampled all = sampled(*kernel, with, 600);
-  const Sampled some = sampled(*kernel, with, 37);
-  EXPECT_TRUE(std::equal(some.values.begin(), some.values.end(), all.values.begin()));
-  EXPECT_TRUE(std::equal(some.lookups.begin(), some.lookups.end(), all.lookups.begin()));
+  for (const Precision precision : {Precision::float64, Precision::float32}) {
+    const auto kernel = EstimatorTemplate<NextFlightRatioTracking>().kernel(1, precision);
+    const Sampled all = sampled(*kernel, with, 600);
+    for (const std::size_t count : {1, 2, 37}) {
+      const Sampled some = sampled(*kernel, with, count);
+      EXPECT_TRUE(std::equal(some.values.begin(), some.values.end(), all.values.begin())) << count;
+      EXPECT_TRUE(std::equal(some.lookups.begin(), some.lookups.end(), all.lookups.begin())) << count;
+    }
+  }
 }
 
 /// Float's own means: against double's on the same ray, within six standard errors of both and what 24 bits leave.
