@@ -578,7 +578,8 @@ TEST_F(Check, AMarchIsJudgedByItsOwnMeanAlone) {
       "matrix":{"estimator":[{"type":"ray_marching","offset":["left","midpoint","uniform"],"steps":[16,32,64,128]}],
                 "medium":[{"type":"exponential","optical_depth":0.5}]})"));
   ASSERT_EQ(run("run m.json -o r.json"), 0) << read("err");
-  for (const Json& cell : Json::parse(read("r.json"))["cells"]) {
+  const Json results = Json::parse(read("r.json"));
+  for (const Json& cell : results["cells"]) {
     EXPECT_TRUE(cell["verdict"]["unbiased"].is_null()) << cell;
     EXPECT_EQ(cell["verdict"]["own_mean"], "PASS") << cell["verdict"];
   }

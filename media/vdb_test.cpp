@@ -426,6 +426,9 @@ TEST_F(Vdb, ReadersThatDieAreAnError) {
                                                 {SIGXCPU, "without an end; the file is damaged"},
                                                 {SIGALRM, "did not finish in"},
                                                 {SIGKILL, "was killed (signal 9)"}}) {
+#if defined(__SANITIZE_ADDRESS__)
+    if (signal == SIGSEGV) continue;  // the sanitizer makes an exit of it
+#endif
     std::string limits;
     std::thread killer([&, number = signal] { ::kill(limited_child(limits), number); });
     expect_refused(path(), "density", "file", {words});
