@@ -57,7 +57,7 @@ Spectrum radiance_behind(const TransportScene& scene, const SurfaceHit& hit) {
 Spectrum known_radiance(const TransportScene& scene, const Ray& camera) {
   const int channels = scene.medium->channels();
   const Effects effects = effects_of(scene);
-  const Spectrum environment = or_black(scene.environment.radiance, channels);
+  Spectrum environment = or_black(scene.environment.radiance, channels);
   const Spectrum emitted = or_black(scene.emission.radiance, channels);
   if (effects.emission && scene.emission.field) return Spectrum::Constant(channels, std::nan(""));
   if (!effects.scattering) {

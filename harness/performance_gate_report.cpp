@@ -87,6 +87,7 @@ std::vector<std::string> left_out(const PerformanceReport& report) {
     if (++count == 1) example = row.cell;
   }
   std::vector<std::string> lines;
+  lines.reserve(reasons.size());
   for (const auto& [reason, seen] : reasons)
     lines.push_back(
         fmt::format("not compared ({}): {} cell{}, for example {}", reason, seen.first, seen.first == 1 ? "" : "s", seen.second));

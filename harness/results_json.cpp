@@ -403,14 +403,14 @@ std::string results_text(const RunRecord& run) {
 }
 
 RunRecord read_results(const std::string& text, const std::string& file) {
-  const InputError no_results(file + ": is no results file of nullmark; `nullmark run` writes them");
+  const auto no_results = [&] { return InputError(file + ": is no results file of nullmark; `nullmark run` writes them"); };
   const std::size_t first = text.find_first_not_of(" \t\r\n");
-  if (first != std::string::npos && text[first] != '{') throw no_results;
+  if (first != std::string::npos && text[first] != '{') throw no_results();
   const Json json = parse_json(text, file);
   const Place top(json, file);
   if (json.contains("$schema") && json["$schema"] == kConfigSchema)
     throw InputError(file + ": is a configuration; `nullmark run` it first");
-  if (!top.has("nullmark_schema")) throw no_results;
+  if (!top.has("nullmark_schema")) throw no_results();
   if (const Place schema = top["nullmark_schema"];
       !json["nullmark_schema"].is_number_integer() || json["nullmark_schema"] != RunRecord::kSchema)
     schema.expected(fmt::format("{}, the schema this program reads", RunRecord::kSchema));

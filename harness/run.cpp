@@ -746,6 +746,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
   }
 
   std::vector<const PreparedCell*> to_time;
+  to_time.reserve(untimed.size() + cells.size());
   for (const PreparedCell& prepared : untimed) to_time.push_back(&prepared);
   Effort effort;
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -756,6 +757,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
 
   if (timing && !to_time.empty() && !stop()) {
     std::vector<TimedCell> timed;
+    timed.reserve(to_time.size());
     for (const PreparedCell* prepared : to_time) timed.push_back({prepared->cell, prepared->scene.get(), prepared->kernel.get()});
     const auto times = time_cells(timed, plan.timing, stop, [&](double fraction) { observer.timing(fraction); });
     for (std::size_t i = 0; i < times.size(); ++i) {
@@ -771,6 +773,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     observer.statistics_share(effort.statistics / (effort.working - effort.statistics));
   }
   std::vector<CellRecord> result;
+  result.reserve(records.size());
   for (auto& [index, record] : records) result.push_back(std::move(record));
   return result;
 }

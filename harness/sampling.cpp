@@ -184,7 +184,7 @@ constexpr Real kRangeSlack = 1e-9, kSingleRangeSlack = 1e-5;
 /// grown to the largest of their magnitudes.
 bool subtract(const Real* values, Real reference, Real low, Real high, std::span<Real> errors, Real& largest) {
   Eight value{}, most{}, least{};
-  auto inside = value == value;
+  auto inside = most == least;  // in every lane
   std::size_t i = 0;
   for (; i + kEight <= errors.size(); i += kEight) {
     load(values + i, value);

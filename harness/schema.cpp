@@ -27,12 +27,12 @@ Json list_of(Json item, int least = 0) {
 Json one_or_list(const Json& item) { return {{"anyOf", {item, list_of(item, 1)}}}; }
 
 /// An object without keys of its own making, but for comments.
-Json closed_object(Json properties, std::vector<std::string> required = {}) {
+Json closed_object(Json properties, const std::vector<std::string>& required = {}) {
   Json json = {{"type", "object"},
                {"properties", std::move(properties)},
                {"patternProperties", {{"^x-", Json::object()}}},
                {"additionalProperties", false}};
-  if (!required.empty()) json["required"] = std::move(required);
+  if (!required.empty()) json["required"] = required;
   return json;
 }
 
@@ -163,8 +163,9 @@ Json definitions() {
        {"note", {{"type", "string"}}}},
       {"label"});
   const Json metric = {{"enum", metric_names()}};
-  const Json compared = {{"anyOf",
-                          {{{"type", "number"}}, list_of({{"type", "number"}}, 1), {{"const", "theory"}}, one_or_list(reference("cells"))}}};
+  const Json compared = {
+      {"anyOf",
+       {{{"type", "number"}}, list_of({{"type", "number"}}, 1), {{"const", "theory"}}, one_or_list(reference("cells"))}}};
   const Json part = closed_object(
       {{"says", described({{"type", "string"}}, "this part of the claim in words")},
        {"metric", metric},

@@ -81,6 +81,7 @@ std::size_t voxel_bytes(const Medium& medium) {
 /// Nanoseconds per sample of each repetition.
 std::vector<Real> sample_times(const std::vector<Repetition>& repetitions) {
   std::vector<Real> ns;
+  ns.reserve(repetitions.size());
   for (const Repetition& repetition : repetitions) ns.push_back(repetition.ns_per_iteration / repetition.samples);
   return ns;
 }
@@ -88,6 +89,7 @@ std::vector<Real> sample_times(const std::vector<Repetition>& repetitions) {
 BatchTime batch_time(std::uint64_t samples_per_traversal, const std::vector<Real>& ns) {
   BatchTime batch{samples_per_traversal, median(ns), 0};
   std::vector<Real> deviation;
+  deviation.reserve(ns.size());
   for (const Real each : ns) deviation.push_back(std::abs(each - batch.ns_per_sample));
   batch.mad = median(deviation);
   return batch;

@@ -50,8 +50,8 @@ struct ExponentialCubeProfile {
   // Halving x towards the logarithm's singularity keeps every piece smooth; what is left below 2^-64 weighs nothing.
   void knots(std::vector<Real>& s) const {
     if (x0 == x1) return;
-    for (Real at = 0.5; at > 0x1p-65; at /= 2) {
-      const Real knot = (at - x0) / (x1 - x0);
+    for (int halvings = 1; halvings <= 64; ++halvings) {
+      const Real knot = (std::ldexp(Real{1}, -halvings) - x0) / (x1 - x0);
       if (knot > 0 && knot < 1) s.push_back(knot);
     }
   }

@@ -101,8 +101,9 @@ class FilteredVolume final : public Volume {
       // The two planes beyond the ends are tried as well, for rounding may have moved the ends across them.
       const Real first = std::max(whole.lo[axis], std::floor(std::min(a, b)) - Filter::kPlane);
       const Real last = std::min(whole.hi[axis], std::ceil(std::max(a, b)) + Filter::kPlane);
-      for (Real plane = first; plane <= last; ++plane) {
-        const Real at = (plane - o) / d;
+      const auto planes = static_cast<std::int64_t>(last - first) + 1;
+      for (std::int64_t i = 0; i < planes; ++i) {
+        const Real at = (first + static_cast<Real>(i) - o) / d;
         if (at > ray.begin && at < ray.end && at >= inside.begin && at <= inside.end) t.push_back(at);
       }
     }

@@ -34,7 +34,7 @@ struct Emission {
   template <class Value>
   Value at(const Vec3& world, int channels, std::uint64_t& lookups) const {
     if (radiance.size() == 0) return uniform_value<Value>(channels, 0);
-    const Value constant = load<Value>(radiance.data(), channels);
+    Value constant = load<Value>(radiance.data(), channels);
     if (!field) return constant;
     const Vec3 p = field->world_to_local() * world;
     const Box box = field->bounds();

@@ -135,6 +135,7 @@ std::vector<std::string> output_names(const CellRecord& record) {
   if (!record.outputs.empty()) return record.outputs;
   if (record.channels == 1) return {""};
   std::vector<std::string> names;
+  names.reserve(static_cast<std::size_t>(record.channels));
   for (int c = 0; c < record.channels; ++c) names.push_back(fmt::format("channel {}", c));
   return names;
 }

@@ -39,7 +39,8 @@ Picture shrunk(const Picture& picture, int factor) {
       Real sum = 0;
       for (int v = 0; v < factor; ++v)
         for (int u = 0; u < factor; ++u)
-          sum += picture.values[static_cast<std::size_t>((y * factor + v) * picture.width + x * factor + u)];
+          sum += picture.values[static_cast<std::size_t>(y * factor + v) * static_cast<std::size_t>(picture.width) +
+                                static_cast<std::size_t>(x * factor + u)];
       small.values.push_back(sum / (factor * factor));
     }
   return small;
