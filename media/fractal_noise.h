@@ -161,15 +161,15 @@ struct FractalNoise {
     return mix(face(v), face(v + row * row), z.weight);
   }
 
-  /// Blends of many points; nodes are counted in double, which is exact below 2^25 of them.
+  /// The same for a register of points; nodes are counted in double, which is exact below 2^25 of them.
   template <std::size_t N>
   Lanes<Real, N> noise(const Octave& octave, Lanes<Real, N> x, Lanes<Real, N> y, Lanes<Real, N> z) const {
     using Pack = Lanes<Real, N>;
     const Real cells = octave.cells, row = cells + 1;
     const auto cell = [&](Pack& u) {
-      const Pack at = u * cells, cell = smaller(rounded_down(at), Pack(cells - 1)), t = at - cell;
+      const Pack at = u * cells, lowest = smaller(rounded_down(at), Pack(cells - 1)), t = at - lowest;
       u = smaller(Pack(1), t * t * (3 - 2 * t));
-      return cell;
+      return lowest;
     };
     const Pack i = cell(x), j = cell(y), k = cell(z);
     const auto corner = hn::DemoteTo(hn::FixedTag<std::int32_t, N>(), ((k * row + j) * row + i).vector());
