@@ -56,13 +56,12 @@ struct AnalogDecompositionTracking {
 
   struct Walk {
     Real control_path = 0;  ///< distance of the control's collision, infinite where it has none on the ray
-    Real distance = 0;
     bool done = false, looked_up = false;
   };
 
   void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
     flight.start(ray.control);
-    walk = {flight.next(rng) ? flight.position() : kInfinity, ray.end, false, false};
+    walk = {flight.next(rng) ? flight.position() : kInfinity, false, false};
     flight.start(ray.residual);
   }
 
@@ -70,23 +69,20 @@ struct AnalogDecompositionTracking {
     if (walk.done) return false;
     const bool inside = flight.next(rng);
     if (flight.position() <= walk.control_path) return inside;
-    walk.distance = walk.control_path;
     walk.done = true;
     return false;
   }
 
   void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    if (!(rng.uniform() * at.rate() < channel(extinction, 0) - ray.control.rate(at.piece()))) return;
-    walk.distance = at.position();
-    walk.done = walk.looked_up = true;
+    walk.done = walk.looked_up = rng.uniform() * at.rate() < channel(extinction, 0) - ray.control.rate(at.piece());
   }
 
   Value result(const Walk& walk, const Ray& ray) const { return ray.value(walk.done ? 0 : 1); }
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray) const {
-    return {walk.done ? EventKind::collision : EventKind::escape, walk.distance, ray.value(1)};
+  Event<Value> event(const Walk& walk, const Ray& ray, const Flight& at) const {
+    return {walk.done ? EventKind::collision : EventKind::escape, std::min(walk.control_path, at.position()), ray.value(1)};
   }
 
   int real_collisions(const Walk& walk, const Ray&) const { return walk.looked_up; }

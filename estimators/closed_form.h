@@ -32,7 +32,7 @@ struct ClosedForm {
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Passage<Value>& ray) const {
+  Event<Value> event(const Walk& walk, const Passage<Value>& ray, const Flight&) const {
     const Real distance = ray.distance_at_depth(walk.depth);
     if (distance < ray.end) return {EventKind::collision, distance, ray.value(1)};
     return {EventKind::escape, ray.end, ray.value(1)};

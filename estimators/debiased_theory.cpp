@@ -8,6 +8,7 @@
 #include <complex>
 #include <numbers>
 
+#include "estimators/log_factorial.h"
 #include "estimators/march_theory.h"
 
 namespace nullmark {
@@ -179,7 +180,7 @@ std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Re
   constexpr Real kLost = 1e-9;
   const Real y = *most - *least;
   int orders = kFewestOrders;
-  while (20 * std::exp(orders * std::log(y * y / 2) - std::lgamma(orders + 1) + 2 * *most) > kLost)
+  while (20 * std::exp(orders * std::log(y * y / 2) - log_factorial(orders) + 2 * *most) > kLost)
     if (++orders > kMostOrder) return std::nullopt;
   constexpr Eigen::Index kPivots = 16;
   const Law rule = gauss_rule(*depth, kPivots);

@@ -52,16 +52,22 @@ struct DeltaTracking {
 
   struct Separate {
     int walking = 0;  ///< the channel that walks
+    bool done = false;
   };
 
   struct Walk : std::conditional_t<kChromatic, Separate, std::monostate> {
     Value transmittance;
-    Truth<Value> done = false;
-    Distance<Value> distance = 0;  ///< of a grey walk's collision
   };
 
+  static auto done(const Walk& walk) {
+    if constexpr (kChromatic)
+      return walk.done;
+    else
+      return vanished(walk.transmittance);
+  }
+
   void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
-    walk = {{}, ray.value(1), false, ray.end};
+    walk = {{}, ray.value(1)};
     if (!ray.per_channel.empty()) flight.start(ray.per_channel[0]);
   }
 
@@ -74,7 +80,7 @@ struct DeltaTracking {
         flight.start(ray.per_channel[static_cast<std::size_t>(walk.walking)]);
       }
     }
-    return flight.next(rng, !walk.done);
+    return flight.next(rng, !done(walk));
   }
 
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
@@ -87,8 +93,7 @@ struct DeltaTracking {
       }
     }
     walk.transmittance = select(extinction > threshold, ray.value(0), walk.transmittance);
-    walk.done = vanished(walk.transmittance);
-    walk.distance = select(walk.done, at.position(), walk.distance);
+    if constexpr (kChromatic) walk.done = vanished(walk.transmittance);
   }
 
   Value result(const Walk& walk, const auto&) const { return walk.transmittance; }
@@ -98,15 +103,15 @@ struct DeltaTracking {
   /// Channels that share a walk end apart.
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray) const {
-    return {walk.done ? EventKind::collision : EventKind::escape, walk.distance, ray.value(1)};
+  Event<Value> event(const Walk& walk, const Ray& ray, const Flight& at) const {
+    return {done(walk) ? EventKind::collision : EventKind::escape, at.position(), ray.value(1)};
   }
 
   auto real_collisions(const Walk& walk, const auto& ray) const {
     if constexpr (kChromatic)
       return static_cast<int>(ray.per_channel.empty() ? walk.done : (walk.transmittance == 0).count());
     else
-      return walk.done;
+      return done(walk);
   }
 
   /// Where the majorant is violated every collision is accepted: the walk sees min(mu, mub).

@@ -96,7 +96,9 @@ struct Passage {
 //   Real order(Quantity) const                              of a consistent estimator: |bias| ~ h^order
 //   using Ray = ...; void prepare(Ray&) const               per-ray data of its own, derived from Passage<Value>
 //   Value optical_depth(const Walk&, const Ray&) const      answers Quantity::optical_depth as well
-//   Event<Value> event(const Walk&, const Ray&) const       how the flight ended: answers Quantity::free_path, drives paths
+//   Event<Value> event(const Walk&, const Ray&, const Flight& at) const
+//                                                           how the flight, which stands where it ended, did so: answers
+//                                                           Quantity::free_path, drives paths
 //   bool samples_events(int channels) const                 false where there is no event for so many channels; default true
 //   Theory weight_theory(const Ray&, const RayProfile&, int channel) const
 //                                                           of the event's weight and the lookups of the flight

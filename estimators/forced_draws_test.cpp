@@ -47,7 +47,9 @@ std::vector<std::shared_ptr<const Medium>> media() {
 
 template <class E, class Ray>
 constexpr bool tells_events() {
-  return requires(const E& tracker, const typename E::Walk& walk, const Ray& ray) { tracker.event(walk, ray); };
+  return requires(const E& tracker, const typename E::Walk& walk, const Ray& ray, const Flight& at) {
+    tracker.event(walk, ray, at);
+  };
 }
 
 template <template <class> class E, class Value>

@@ -70,7 +70,7 @@ class HandWalked {
       estimator.consume(walk, ray, flight, looked_up(walk, flight), rng);
     }
     outcome.result = estimator.result(walk, ray);
-    if constexpr (requires { estimator.event(walk, ray); }) outcome.event = estimator.event(walk, ray);
+    if constexpr (requires { estimator.event(walk, ray, flight); }) outcome.event = estimator.event(walk, ray, flight);
     return outcome;
   }
 

@@ -5,6 +5,7 @@
 #include "estimators/estimator.h"
 #include "estimators/event_choice.h"
 #include "estimators/kinks.h"
+#include "estimators/log_factorial.h"
 #include "estimators/survival.h"
 
 namespace nullmark {
@@ -29,11 +30,10 @@ struct HeroWavelengthTracking {
     int hero = 0;
     Value contribution, chance;  ///< f and p, over avg p
     EventKind kind = EventKind::escape;
-    Real distance = 0;
   };
 
   void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const {
-    walk = {-1, ray.value(1), ray.throughput / average(ray.throughput), EventKind::escape, ray.end};
+    walk = {-1, ray.value(1), ray.throughput / average(ray.throughput), EventKind::escape};
   }
 
   bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const {
@@ -48,10 +48,7 @@ struct HeroWavelengthTracking {
     const Value absorb = ray.draws_absorption ? mu.absorb : ray.value(0);
     const EventKind kind =
         choose_event(rng.uniform(), channel(absorb, walk.hero), channel(mu.scatter, walk.hero), channel(mu.null, walk.hero));
-    if (kind != EventKind::escape) {
-      walk.kind = kind;
-      walk.distance = at.position();
-    }
+    walk.kind = kind;
     for (int c = 0; c < ray.channels; ++c) {
       const Real own = channel(kind == EventKind::absorb ? absorb : mu.of(kind), c);
       const Real sum = channel(absorb, c) + channel(mu.scatter, c) + channel(mu.null, c);
@@ -67,7 +64,9 @@ struct HeroWavelengthTracking {
     return walk.kind == EventKind::escape ? walk.contribution : ray.value(0);
   }
 
-  Event<Value> event(const Walk& walk, const Passage<Value>&) const { return {walk.kind, walk.distance, walk.contribution}; }
+  Event<Value> event(const Walk& walk, const Passage<Value>&, const Flight& at) const {
+    return {walk.kind, at.position(), walk.contribution};
+  }
 
   int real_collisions(const Walk& walk, const Passage<Value>&) const { return walk.kind != EventKind::escape; }
 
@@ -134,7 +133,7 @@ struct HeroWavelengthTracking {
     for (Real k = 0; k < last; ++k) {
       const Real sum = std::accumulate(chance.begin(), chance.end(), Real{0});
       if (!(sum > 0)) break;
-      const Real poisson = std::exp(k * std::log(depth) - depth - std::lgamma(k + 1));
+      const Real poisson = std::exp(k * std::log(depth) - depth - log_factorial(k));
       second += poisson * chance[own] * chance[own] * static_cast<Real>(ray.channels) / sum;
       for (std::size_t l = 0; l < channels; ++l) chance[l] *= ratio[l];
     }

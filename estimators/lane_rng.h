@@ -31,20 +31,20 @@ class LaneRng {
   /// Multiples of 2^-53 (2^-24 in float) in [0, 1).
   [[gnu::always_inline]] Pack uniform() {
     draws_ += living_;
-    return Pack(1) - rest();
+    return fraction();
   }
 
   /// Unit exponentials -log(1 - u): at most 36.7 (16.6 in float).
   [[gnu::always_inline]] Pack exponential() {
     draws_ += living_;
-    return negative_logarithm(rest());
+    return negative_logarithm(Pack(1) - fraction());
   }
 
   /// The same where only the lanes of the mask draw; the others' streams stay where they were.
   Pack exponential(Mask lanes) {
     const State before = state_;
     draws_ += count(lanes & alive_);
-    const Pack e = negative_logarithm(rest());
+    const Pack e = negative_logarithm(Pack(1) - fraction());
     for (std::size_t w = 0; w < kWords; ++w)
       state_[w] = hn::IfThenElse(hn::RebindMask(Tag(), lanes.mask()), state_[w], before[w]);
     return e;
@@ -64,8 +64,8 @@ class LaneRng {
   }
 
  private:
-  /// 1 - u of the next draw, exact.
-  [[gnu::always_inline]] Pack rest() {
+  /// The next u; 1 - u is exact as well.
+  [[gnu::always_inline]] Pack fraction() {
     using namespace hn;
     const auto rotated = []<int k>(Vector v, std::integral_constant<int, k>) {
       return RotateRight<static_cast<int>(sizeof(Word)) * 8 - k>(v);
@@ -77,7 +77,7 @@ class LaneRng {
       const Vector output = Add(rotated(Add(a, state_[1]), std::integral_constant<int, 17>()), a);
       state_[0] = Xor(Xor(rotated(a, std::integral_constant<int, 49>()), b), ShiftLeft<21>(b));
       state_[1] = rotated(b, std::integral_constant<int, 28>());
-      return Pack(1) - Pack(ConvertTo(reals, BitCast(integers, ShiftRight<11>(output)))) * Pack(0x1p-53);
+      return Pack(ConvertTo(reals, BitCast(integers, ShiftRight<11>(output)))) * Pack(0x1p-53);
     } else {
       const Vector output = Add(rotated(Add(state_[0], state_[3]), std::integral_constant<int, 7>()), state_[0]);
       const Vector t = ShiftLeft<9>(state_[1]);
@@ -87,7 +87,7 @@ class LaneRng {
       state_[0] = Xor(state_[0], state_[3]);
       state_[2] = Xor(state_[2], t);
       state_[3] = rotated(state_[3], std::integral_constant<int, 11>());
-      return Pack(1) - Pack(ConvertTo(reals, BitCast(integers, ShiftRight<8>(output)))) * Pack(0x1p-24);
+      return Pack(ConvertTo(reals, BitCast(integers, ShiftRight<8>(output)))) * Pack(0x1p-24);
     }
   }
 

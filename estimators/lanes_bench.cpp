@@ -33,14 +33,14 @@ void plain(benchmark::State& state, bool ratio, Real majorant, const auto& extin
                     [&](PlainRng& rng, std::uint64_t& lookups) { return plain_delta_loop(rng, majorant, extinction, lookups); });
 }
 
-template <class T, bool with_exponential>
+template <class T, bool with_exponential, bool with_number = false>
 void lane_floor(benchmark::State& state) {
   constexpr std::uint64_t kSteps = 4096;
   auto streams = LaneRng<T, kNativeLanes<T>>::seeded({1, 2, 3});
   volatile Real rate = 1e-3;
   std::uint64_t steps = 0;
   for ([[maybe_unused]] auto _ : state) {
-    benchmark::DoNotOptimize(lane_floor_loop<T, with_exponential>(streams, rate, kSteps));
+    benchmark::DoNotOptimize(lane_floor_loop<T, with_exponential, with_number>(streams, rate, kSteps));
     steps += kSteps;
   }
   count_items(state, "sample", steps);
@@ -62,6 +62,7 @@ void add(const std::string& profile, bool ratio, Real lookups, const std::shared
   in_registry("least step, float", lane_floor<float, false>);
   in_registry("least step with exponential, double", lane_floor<double, true>);
   in_registry("least step with exponential, float", lane_floor<float, true>);
+  if (!ratio) in_registry("least step with exponential and two numbers, float", lane_floor<float, true, true>);
 }
 
 [[maybe_unused]] const BenchmarkGroup kGroup([] {

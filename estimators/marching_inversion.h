@@ -36,7 +36,7 @@ struct MarchingInversion : RayMarching<Value> {
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray) const {
+  Event<Value> event(const Walk& walk, const Ray& ray, const Flight&) const {
     if (walk.distance < kInfinity) return {EventKind::collision, std::min(walk.distance, ray.end), ray.value(1)};
     return {EventKind::escape, ray.end, ray.value(1)};
   }

@@ -66,10 +66,9 @@ struct NullCollisionTracking {
   struct Walk {
     Value weight;
     EventKind kind = EventKind::escape;
-    Real distance = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape, ray.end}; }
+  void init(Walk& walk, const Ray& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape}; }
 
   bool propose(Walk& walk, const Ray&, Flight& flight, auto& rng) const {
     return walk.kind == EventKind::escape && flight.next(rng);
@@ -80,17 +79,14 @@ struct NullCollisionTracking {
     const Chances chance = chances(ray, mu);
     const std::optional<EventKind> kind =
         ray.three ? three_roulettes(chance, rng) : choose_event(rng.uniform(), chance.absorb, chance.scatter, chance.null);
-    if (kind != EventKind::escape) {
-      walk.kind = kind.value_or(EventKind::absorb);
-      walk.distance = at.position();
-    }
+    walk.kind = kind.value_or(EventKind::absorb);
     const Real p = kind ? chance.of(*kind) : 0;
     walk.weight = p > 0 ? Value(walk.weight * mu.of(*kind) / (at.rate() * p)) : ray.value(0);
   }
 
   Value result(const Walk& walk, const Ray& ray) const { return walk.kind == EventKind::escape ? walk.weight : ray.value(0); }
 
-  Event<Value> event(const Walk& walk, const Ray&) const { return {walk.kind, walk.distance, walk.weight}; }
+  Event<Value> event(const Walk& walk, const Ray&, const Flight& at) const { return {walk.kind, at.position(), walk.weight}; }
 
   int real_collisions(const Walk& walk, const Ray&) const { return walk.kind != EventKind::escape; }
 

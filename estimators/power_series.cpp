@@ -1,7 +1,6 @@
 #include "estimators/power_series.h"
 
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 
 namespace nullmark {
@@ -49,8 +48,6 @@ Real PoissonTail::log_at_least(std::int64_t i) const {
   for (Real term = 1, k = from + 1; term > 1e-17 * sum; ++k) sum += term *= mean_ / k;
   return from * std::log(mean_) - mean_ - log_factorial(from) + std::log(sum);
 }
-
-Real log_factorial(Real i) { return boost::math::lgamma(i + 1); }
 
 std::optional<Real> series_variance(Real depth, Real first, const std::function<Real(std::int64_t)>& log_growth, Real last) {
   constexpr Real kMostTerms = 1e7, kLeast = -1;

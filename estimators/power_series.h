@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "estimators/estimator.h"
+#include "estimators/log_factorial.h"
 
 namespace nullmark {
 
@@ -125,9 +126,6 @@ SeriesMoments series_moments(const Passage<Value>& ray, const RayProfile& profil
 /// no difference of large numbers, and 0 where it should be.  `last`: no later i matters.  Nothing where the terms alternate in
 /// sign and cancel, or are too many.
 std::optional<Real> series_variance(Real depth, Real first, const std::function<Real(std::int64_t)>& log_growth, Real last);
-
-/// log i!
-Real log_factorial(Real i);
 
 /// A last term for series_variance where P_i is at least that of a Poisson number of mean M.
 Real last_poisson_term(const SeriesMoments& moments);

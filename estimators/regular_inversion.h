@@ -74,7 +74,7 @@ struct RegularInversion {
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray) const {
+  Event<Value> event(const Walk& walk, const Ray& ray, const Flight&) const {
     if (walk.distance < kInfinity) return {EventKind::collision, walk.distance, ray.value(1)};
     return {EventKind::escape, ray.end, ray.value(1)};
   }

@@ -5,6 +5,7 @@
 #include "estimators/estimator.h"
 #include "estimators/event_choice.h"
 #include "estimators/kinks.h"
+#include "estimators/log_factorial.h"
 #include "estimators/survival.h"
 
 namespace nullmark {
@@ -65,12 +66,11 @@ struct SpectralTracking {
   struct Walk {
     Value weight;
     EventKind kind = EventKind::escape;
-    Real distance = 0;
     Real lookup_chance = 1;  ///< that a tentative collision here is not the control's
     bool looked_up = false;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape, ray.end, 1, false}; }
+  void init(Walk& walk, const Ray& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape, 1, false}; }
 
   bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
     if (walk.kind != EventKind::escape || !flight.next(rng)) return false;
@@ -83,7 +83,7 @@ struct SpectralTracking {
     const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : 0,
                scatter = measure(ray, walk.weight, mu.scatter);
     const Real chance = 1 - walk.lookup_chance;
-    end(walk, flight, choose_event((u - walk.lookup_chance) / chance, absorb, scatter, 0));
+    walk.kind = choose_event((u - walk.lookup_chance) / chance, absorb, scatter, 0);
     take(walk, ray, mu, flight.rate() * chance, walk.kind, absorb, scatter, 0);
     return false;
   }
@@ -94,16 +94,14 @@ struct SpectralTracking {
     const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : 0,
                scatter = measure(ray, walk.weight, mu.scatter), null = measure(ray, walk.weight, mu.null);
     const EventKind kind = choose_event(rng.uniform(), absorb, scatter, null);
-    if (kind != EventKind::escape) {
-      end(walk, at, kind);
-      walk.looked_up = true;
-    }
+    walk.kind = kind;
+    walk.looked_up = kind != EventKind::escape;
     take(walk, ray, mu, at.rate() * walk.lookup_chance, kind, absorb, scatter, null);
   }
 
   Value result(const Walk& walk, const Ray& ray) const { return walk.kind == EventKind::escape ? walk.weight : ray.value(0); }
 
-  Event<Value> event(const Walk& walk, const Ray&) const { return {walk.kind, walk.distance, walk.weight}; }
+  Event<Value> event(const Walk& walk, const Ray&, const Flight& at) const { return {walk.kind, at.position(), walk.weight}; }
 
   int real_collisions(const Walk& walk, const Ray&) const { return walk.looked_up; }
 
@@ -158,11 +156,6 @@ struct SpectralTracking {
     mu.absorb -= control.absorb;
     mu.scatter -= control.scatter;
     return mu;
-  }
-
-  static void end(Walk& walk, const Flight& at, EventKind kind) {
-    walk.kind = kind;
-    walk.distance = at.position();
   }
 
   /// w_l *= mu_k,l/(rate P_k); nothing is left where absorption, not an event, took all.
@@ -243,7 +236,7 @@ struct SpectralTracking {
     const Real last = depth + 12 * std::sqrt(depth) + 40;
     for (Real k = 0; k < last && chance > 0; ++k) {
       const Step step(ray, weight, extinction, 0);
-      const Real w = channel(weight, c), poisson = std::exp(k * std::log(depth) - depth - std::lgamma(k + 1));
+      const Real w = channel(weight, c), poisson = std::exp(k * std::log(depth) - depth - log_factorial(k));
       const Real next = boost::math::gamma_p(k + 1, depth) * chance * step.lookup;
       second += poisson * chance * w * w;
       lookups += next;

@@ -68,12 +68,12 @@ struct WeightedDecompositionTracking {
   }
 
   struct Walk {
-    Real weight = 1, distance = 0;
+    Real weight = 1;
     bool done = false, looked_up = false;
   };
 
   void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
-    walk = {1, ray.end, false, false};
+    walk = {1, false, false};
     flight.start(ray.rate);
   }
 
@@ -81,7 +81,6 @@ struct WeightedDecompositionTracking {
     if (walk.done || !flight.next(rng)) return false;
     const Real mu_c = ray.control.rate(flight.piece());
     if (rng.uniform() * flight.rate() >= mu_c && flight.rate() > mu_c) return true;
-    walk.distance = flight.position();
     walk.done = true;
     return false;
   }
@@ -91,17 +90,15 @@ struct WeightedDecompositionTracking {
     const bool real = rng.uniform() * part.sum < std::abs(part.residual);
     const Real grown = part.sum / (at.rate() - ray.control.rate(at.piece()));
     walk.weight *= (real ? part.residual : part.null) < 0 ? -grown : grown;
-    if (!real) return;
-    walk.distance = at.position();
-    walk.done = walk.looked_up = true;
+    walk.done = walk.looked_up = real;
   }
 
   Value result(const Walk& walk, const Ray& ray) const { return ray.value(walk.done ? 0 : walk.weight); }
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray) const {
-    return {walk.done ? EventKind::collision : EventKind::escape, walk.distance, ray.value(walk.weight)};
+  Event<Value> event(const Walk& walk, const Ray& ray, const Flight& at) const {
+    return {walk.done ? EventKind::collision : EventKind::escape, at.position(), ray.value(walk.weight)};
   }
 
   int real_collisions(const Walk& walk, const Ray&) const { return walk.looked_up; }

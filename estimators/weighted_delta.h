@@ -24,10 +24,9 @@ struct WeightedDeltaTracking {
   struct Walk {
     Value weight, collision;  ///< of each channel's walk so far, and of its collision
     Truth<Value> done = false;
-    Distance<Value> distance = 0;  ///< where a grey walk ended
   };
 
-  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(1), ray.value(0), false, ray.end}; }
+  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(1), ray.value(0), false}; }
 
   auto propose(Walk& walk, const auto&, auto& flight, auto& rng) const { return flight.next(rng, !walk.done); }
 
@@ -38,7 +37,6 @@ struct WeightedDeltaTracking {
     walk.collision = select(extinction > u * sum, walk.weight * grown, walk.collision);
     walk.weight = select(extinction > u * sum, ray.value(0), walk.weight * null);
     walk.done = vanished(walk.weight);
-    walk.distance = select(walk.done, at.position(), walk.distance);
   }
 
   Value result(const Walk& walk, const auto&) const { return walk.weight; }
@@ -46,9 +44,9 @@ struct WeightedDeltaTracking {
   /// Channels that share a walk end apart.
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Passage<Value>& ray) const {
-    if (!walk.done) return {EventKind::escape, ray.end, walk.weight};
-    return {EventKind::collision, walk.distance, walk.collision};
+  Event<Value> event(const Walk& walk, const Passage<Value>&, const Flight& at) const {
+    if (!walk.done) return {EventKind::escape, at.position(), walk.weight};
+    return {EventKind::collision, at.position(), walk.collision};
   }
 
   auto real_collisions(const Walk& walk, const auto&) const { return walk.done; }

@@ -38,7 +38,9 @@ class BlockKernel : public Kernel {
   };
 
  private:
-  static constexpr bool kSamplesEvents = requires(const E& e, const Walk& walk, const Ray& ray) { e.event(walk, ray); };
+  static constexpr bool kSamplesEvents = requires(const E& e, const Walk& walk, const Ray& ray, const Flight& at) {
+    e.event(walk, ray, at);
+  };
   static constexpr bool kTellsProfile = requires(const E& e, const Walk& walk, const Ray& ray) {
     e.transmittance_at(walk, ray, Real{0});
   };
@@ -183,7 +185,7 @@ class BlockKernel : public Kernel {
     std::size_t recorded_before = 0;
     if constexpr (recorded) {
       recorded_before = state.recording->walks.size();
-      state.recording->walks.resize(recorded_before + count);
+      state.recording->add(count);
     }
     const Vec3 origin = context.local.origin, direction = context.local.direction;
     std::size_t active = count;
@@ -210,7 +212,7 @@ class BlockKernel : public Kernel {
             walk.total_depth = flight.depth() + flight.depth_left();
             walk.draws = state.rng[k].draws();
             if constexpr (kSamplesEvents) {
-              const Event<Value> event = estimator_.event(state.walk[k], ray);
+              const Event<Value> event = estimator_.event(state.walk[k], ray, state.flight[k]);
               walk.end = event.kind;
               walk.distance = event.distance;
             }
@@ -279,7 +281,7 @@ class BlockKernel : public Kernel {
   /// Scores of a free path: its weight in the bin of its collision, where it scatters, where it escapes, and wherever it ends.
   void score(State& state, const Ray& ray, std::uint32_t k, const RayContext& context, Real* values) const {
     if constexpr (kSamplesEvents) {
-      const Event<Value> event = estimator_.event(state.walk[k], ray);
+      const Event<Value> event = estimator_.event(state.walk[k], ray, state.flight[k]);
       const auto channels = static_cast<std::size_t>(channels_);
       std::fill(values, values + outputs(Quantity::free_path, context), Real{0});
       Real* const scattered = values + kFreePathBins * channels;

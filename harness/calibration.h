@@ -44,9 +44,9 @@ inline Real floor_loop(PlainRng& rng, Real inverse_rate, std::uint64_t steps) {
   return t;
 }
 
-/// The same in registers of this build's width, with an exponential where asked: the least that `steps` tentative collisions, a
-/// multiple of the lanes, can cost.
-template <class T, bool with_exponential = false>
+/// The same in registers of this build's width, with an exponential and a second random number where asked: the least that
+/// `steps` tentative collisions, a multiple of the lanes, can cost.
+template <class T, bool with_exponential = false, bool with_number = false>
 Real lane_floor_loop(typename LaneRng<T, kNativeLanes<T>>::State& streams, Real inverse_rate, std::uint64_t steps) {
   using Pack = Lanes<T, kNativeLanes<T>>;
   LaneRng<T, kNativeLanes<T>> rng(streams, true);
@@ -54,6 +54,7 @@ Real lane_floor_loop(typename LaneRng<T, kNativeLanes<T>>::State& streams, Real 
   for (std::uint64_t i = 0; i < steps; i += kNativeLanes<T>) {
     t += rng.exponential() * Pack(inverse_rate);
     if constexpr (with_exponential) sum += exponential(-t);
+    if constexpr (with_number) sum += rng.uniform();
   }
   T lanes[kNativeLanes<T>];
   (t + sum).store(lanes);

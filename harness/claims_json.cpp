@@ -1,6 +1,7 @@
 #include "harness/claims_json.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <set>
@@ -32,6 +33,9 @@ void read_compared_with(const Place& part, const Place& place, const CellFinder&
   const bool number =
       place.json().is_number() || (place.json().is_array() && !place.json().empty() && place[0].json().is_number());
   if (!number && !out.slope_against.empty()) place.expected("a number, which the slope is compared with");
+  if (place.json().is_string())
+    place.fail(
+        fmt::format("found {}; expected a number, one for each cell, \"theory\" or a pattern of cells", place.json().dump()));
   if (number)
     for (const Place& value : place.elements_or_self()) out.numbers.push_back(value.number());
   else
@@ -76,6 +80,10 @@ ClaimPart read_part(const Place& place, const CellFinder& finder) {
     return part;
   }
   part.metric = place["metric"].one_of(metric_names(), "metric");
+  const std::vector<std::string>& claimable = claimable_metric_names();
+  if (std::find(claimable.begin(), claimable.end(), part.metric) == claimable.end())
+    place["metric"].fail(fmt::format("\"{}\" has no standard error, so that nothing could be told; expected one of {}",
+                                     part.metric, fmt::join(claimable, ", ")));
   if (place.has("tolerance") != (part.relation == Relation::near))
     place.fail("expected \"tolerance\" beside \"near\", and only there");
   read_compared_with(place, place[*relation], finder, part);

@@ -68,6 +68,8 @@ TEST(Claims, WhatIsWrongIsNamedWithItsPlace) {
   says(R"(,"metric":"variance")", "exactly one of \"near\", \"at_most\", \"at_least\" and \"unbiased\"");
   says(R"(,"metric":"variance","at_most":1,"at_least":1)", "exactly one of");
   says(R"(,"metric":"varience","at_most":1)", "did you mean \"variance\"?");
+  says(R"(,"metric":"ns_per_sample","at_most":1)", "\"ns_per_sample\" has no standard error");
+  says(R"(,"metric":"variance","at_most":"thoery")", "found \"thoery\"; expected a number, one for each cell, \"theory\" or");
   says(R"(,"metric":"variance","near":1)", "\"tolerance\" beside \"near\"");
   says(R"(,"metric":"variance","at_most":1,"tolerance":1)", "\"tolerance\" beside \"near\"");
   says(R"(,"metric":"variance","at_most":[1,2,3])", "found 3 to compare with; expected 2");

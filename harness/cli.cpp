@@ -97,6 +97,7 @@ class CommandLine {
       return ExitCode::ok;
     }
     refuse_unknown_command(words[1]);
+    refuse_unknown_option(words);
     std::vector<std::string> reversed(words.rbegin(), words.rend() - 1);
     try {
       app_.parse(reversed);
@@ -113,6 +114,16 @@ class CommandLine {
     std::vector<std::string> names;
     for (const CLI::App* command : app_.get_subcommands({})) names.push_back(command->get_name());
     if (word.rfind('-', 0) != 0) expect_one_of(word, names, "command");
+  }
+
+  /// CLI11 refuses it as well, but does not tell the nearest.
+  void refuse_unknown_option(const std::vector<std::string>& words) const {
+    if (words[1].rfind('-', 0) == 0) return;
+    std::vector<std::string> names;
+    for (const CLI::Option* option : app_.get_subcommand(words[1])->get_options())
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (std::size_t i = 2; i < words.size() && words[i] != "--"; ++i)
+      if (words[i].rfind("--", 0) == 0) expect_one_of(words[i].substr(0, words[i].find('=')), names, "option");
   }
 
   template <class Action>
@@ -218,10 +229,12 @@ class CommandLine {
 
   void add_list() {
     CLI::App* command = add("list", "List what configurations may name, with parameters and sources", [this] {
-      expect_one_of(list_.what, {"estimators", "media", "majorants", "rays", "quantities"}, "list");
+      const std::vector<std::string> lists = {"estimators", "media", "majorants", "rays", "quantities"};
+      if (list_.what.empty()) throw InputError(fmt::format("list what? expected one of {}", fmt::join(lists, ", ")));
+      expect_one_of(list_.what, lists, "list");
       return list_command(list_);
     });
-    command->add_option("WHAT", list_.what, "estimators, media, majorants, rays or quantities")->required();
+    command->add_option("WHAT", list_.what, "estimators, media, majorants, rays or quantities");
     command->add_flag("--json", list_.json, "As JSON");
   }
 

@@ -43,6 +43,8 @@ std::string floor_shown(const Contender& contender) {
 std::string break_even_shown(const Contender& contender) {
   if (!contender.break_even) return "";
   switch (contender.break_even->kind) {
+    case BreakEven::Kind::first_sample:
+      return "its first sample";
     case BreakEven::Kind::never_cheaper:
       return "never cheaper";
     case BreakEven::Kind::no_floor_seen:

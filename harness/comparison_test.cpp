@@ -102,6 +102,14 @@ TEST(Cost, AMarchThatCostsMoreThanTheNoiseIsWorthIsNeverCheaper) {
   EXPECT_EQ(break_even(*cost_of(marching(0.5, 0, 1000)), *cost_of(cell("ratio")))->kind, BreakEven::Kind::never_cheaper);
 }
 
+TEST(Cost, WhatHasItsFirstSampleSoonerIsCheaperUntilTheOthersFirst) {
+  // .001 / (.05 * .5)^2 = 1.6 samples of 20 ns
+  const CellRecord unbiased = cell("unbiased_ray_marching", 0.001, 20);
+  EXPECT_EQ(break_even(*cost_of(marching(0.05, 0, 5)), *cost_of(unbiased))->kind, BreakEven::Kind::at);
+  EXPECT_EQ(break_even(*cost_of(marching(0.1, 0, 19)), *cost_of(unbiased))->kind, BreakEven::Kind::first_sample);
+  EXPECT_EQ(break_even(*cost_of(marching(0.1, 0, 21)), *cost_of(unbiased))->kind, BreakEven::Kind::never_cheaper);
+}
+
 TEST(Cost, FewSamplesCostWhatAsFewCostWhenTheyWereTimed) {
   CellRecord record = cell("exact", 0);
   record.time->samples_per_traversal = 64;

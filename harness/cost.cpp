@@ -120,9 +120,10 @@ std::optional<BreakEven> break_even(const Cost& biased, const Cost& unbiased) {
     return result;
   }
   result.seconds = {time(u.value, b.value, floor.value), time(u.low, b.high, floor.high), time(u.high, b.low, floor.low)};
-  // It must have drawn one sample to have been cheaper.
-  if (result.seconds.value < biased.ns_per_sample->value * kSeconds) {
-    result.kind = BreakEven::Kind::never_cheaper;
+  // Either has no answer before its first sample.
+  const Real first = biased.ns_per_sample->value * kSeconds, first_of_unbiased = unbiased.ns_per_sample->value * kSeconds;
+  if (result.seconds.value < std::max(first, first_of_unbiased)) {
+    result.kind = first < first_of_unbiased ? BreakEven::Kind::first_sample : BreakEven::Kind::never_cheaper;
     return result;
   }
   const auto error = [&](Real of_unbiased, Real seconds) {

@@ -49,8 +49,9 @@ Interval mean_square_error(const Cost& cost, std::uint64_t samples);
 /// When an estimator with a floor stops being cheaper than one without: from
 ///   t = (V_u s_u - V_b s_b) / (floor_b R)^2
 /// on, s being the time of a sample, the unbiased one has the smaller error in the same time.  `error` is that of both then.
+/// Where t is before the first sample of the unbiased one, only a biased one whose samples take less is cheaper, until then.
 struct BreakEven {
-  enum class Kind { at, never_cheaper, no_floor_seen, exact } kind = Kind::at;  ///< exact: but for rounding
+  enum class Kind { at, first_sample, never_cheaper, no_floor_seen, exact } kind = Kind::at;  ///< exact: but for rounding
   Interval seconds, error;
 };
 /// Nothing where either has no time.

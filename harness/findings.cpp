@@ -99,7 +99,7 @@ class Comparer {
     if (part.theory)
       result.expected = theory(part.cells[i], part.metric, result.reason);
     else if (!part.others.empty())
-      result.expected = measured(part.others[i], part.metric, result.reason);
+      result.expected = measured(result.with = part.others[i], part.metric, result.reason);
     else
       result.expected = exactly(part.numbers[part.numbers.size() == 1 ? 0 : i]);
     return decided(part, std::move(result));

@@ -16,6 +16,7 @@ const char* to_string(ClaimOutcome outcome);
 /// One cell's metric, or the slope over all cells, beside what it is compared with.
 struct ComparedCell {
   std::string cell;                            ///< name; empty for a slope over several
+  std::string with;                            ///< name of the cell that it is compared with, if any
   std::optional<Interval> measured, expected;  ///< at the level of kFindingsLevel, not 95 %
   std::string reason;                          ///< why one of them is absent
   ClaimOutcome outcome = ClaimOutcome::cannot_tell;

@@ -173,6 +173,11 @@ TEST(Findings, TheTextHasTheWordTheWorstCellAndByHowMuch) {
   EXPECT_NE(text.find("(3 times it)"), std::string::npos) << text;
   EXPECT_NE(text.find("1 claims: 0 reproduced, 1 refuted"), std::string::npos) << text;
   EXPECT_NE(findings_markdown(findings(run)).find("| C1 | **refuted** |"), std::string::npos);
+  run.claims[0].parts[0].numbers.clear();
+  run.claims[0].parts[0].others = {"b", "a", "a"};
+  const std::string with = findings_text(findings(run));
+  EXPECT_NE(with.find("variance 3 +- "), std::string::npos) << with;
+  EXPECT_NE(with.find(" of a (6 times it)"), std::string::npos) << with;
 }
 
 }  // namespace

@@ -43,6 +43,7 @@ std::string comparison_words(const ClaimPart& part, const ComparedCell& compared
       part.slope_against.empty() ? part.metric : fmt::format("slope of {} over {}", part.metric, part.slope_against);
   std::string text =
       fmt::format("{} {}, {} {}", what, number(*compared.measured), relation_words(part), number(*compared.expected));
+  if (!compared.with.empty()) text += fmt::format(" of {}", compared.with);
   if (compared.expected->value == 0 || !part.slope_against.empty()) return text;
   const Real ratio = compared.measured->value / compared.expected->value;
   return text + (part.relation == Relation::near ? fmt::format(" ({:+.2g} %)", 100 * (ratio - 1))

@@ -67,6 +67,9 @@ std::vector<LawRecord> free_path_laws(const Cell& cell, const Scene& scene, cons
   const std::uint64_t key = stream_key(cell, *scene.medium);
   const auto workspace = kernel.workspace();
   RayContext context;
+  Recording recording;
+  SampleBlock block;
+  Counters counters;
   Real least = 0, statistic = 0, degrees = 0;
   for (std::size_t i = 0; i < taken; ++i) {
     const std::size_t ray = i * rays / taken;
@@ -81,9 +84,7 @@ std::vector<LawRecord> free_path_laws(const Cell& cell, const Scene& scene, cons
     constexpr std::uint64_t kBatch = 4096;
     for (std::uint64_t done = 0; done < samples; done += kBatch) {
       if (stop()) return {};
-      Recording recording;
-      SampleBlock block;
-      Counters counters;
+      recording.restart();
       workspace->recording = &recording;
       kernel.sample(*workspace, *scene.medium->medium, context, key, kFirstSample + done, std::min(kBatch, samples - done),
                     cell.quantity, block, counters);

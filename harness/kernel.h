@@ -67,6 +67,28 @@ struct Recording {
     Real distance = 0;
   };
   std::vector<Walk> walks;
+
+  /// Adds n walks, in memory that `restart` has kept where there is some.
+  void add(std::size_t n) {
+    for (; n > 0; --n) {
+      walks.emplace_back();
+      if (kept_.empty()) continue;
+      walks.back() = std::move(kept_.back());
+      kept_.pop_back();
+    }
+  }
+
+  void restart() {
+    for (Walk& walk : walks) {
+      walk.steps.clear();
+      walk.extinction.clear();
+      kept_.push_back({std::move(walk.steps), std::move(walk.extinction)});
+    }
+    walks.clear();
+  }
+
+ private:
+  std::vector<Walk> kept_;
 };
 
 /// Scratch memory of one thread.

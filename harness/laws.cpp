@@ -22,17 +22,33 @@ class Wealth {
  public:
   explicit Wealth(std::vector<Real> rates) : rates_(std::move(rates)), logs_(2 * rates_.size(), 0) {}
 
-  /// Bets on and against y of mean 0, |y| <= 1/2 over the largest rate.
+  /// Bets on and against y of mean 0 and |y| <= 1/2; the wealth is NaN where a sample out of its range would make it negative.
   void bet(Real y) {
     for (std::size_t i = 0; i < rates_.size(); ++i) {
-      logs_[2 * i] += std::log1p(rates_[i] * y);
-      logs_[2 * i + 1] += std::log1p(-rates_[i] * y);
+      const Real stake = rates_[i] * y, in_range = std::abs(stake) < 1 ? 1 : std::numeric_limits<Real>::quiet_NaN();
+      factors_[2 * i] *= (1 + stake) * in_range;
+      factors_[2 * i + 1] *= (1 - stake) * in_range;
     }
+    if (++bets_ % kBetsToALog == 0) take_logs();
   }
-  Real log() const { return log_mean_exp(logs_); }
+
+  Real log() {
+    take_logs();
+    return log_mean_exp(logs_);
+  }
 
  private:
-  std::vector<Real> rates_, logs_;
+  static constexpr int kBetsToALog = 64;  ///< of factors from .2 to 1.8 a product of so many is a normal number
+
+  void take_logs() {
+    for (std::size_t i = 0; i < logs_.size(); ++i) {
+      logs_[i] += std::log(factors_[i]);
+      factors_[i] = 1;
+    }
+  }
+
+  std::vector<Real> rates_, logs_, factors_ = std::vector<Real>(logs_.size(), 1);
+  std::uint64_t bets_ = 0;
 };
 
 /// All that the walks of the chosen rays tell.
@@ -54,6 +70,9 @@ class LawTester {
     const auto workspace = kernel_.workspace();
     const std::uint64_t key = stream_key(cell_, *scene_.medium);
     std::vector<Real> before, now;  // centred first flights of the ray before and of this one
+    Recording recording;
+    SampleBlock block, alone;
+    Counters counters;
     for (const std::size_t ray : rays_) {
       scene_.context(ray, kernel_, context_);
       kernel_.begin_ray(*workspace, *scene_.medium->medium, scene_.medium->extrema, context_);
@@ -61,9 +80,7 @@ class LawTester {
       now.clear();
       for (std::uint64_t done = 0; done < samples; done += batch) {
         if (stop()) return false;
-        Recording recording;
-        SampleBlock block;
-        Counters counters;
+        recording.restart();
         workspace->recording = &recording;
         kernel_.sample(*workspace, *scene_.medium->medium, context_, key, kFirstSample + done, std::min(batch, samples - done),
                        cell_.quantity, block, counters);
@@ -74,7 +91,6 @@ class LawTester {
         }
         // A sample is a function of its address: drawn alone it is the same.
         const std::size_t last = block.lookups.size() - 1;
-        SampleBlock alone;
         kernel_.sample(*workspace, *scene_.medium->medium, context_, key, kFirstSample + done + last, 1, cell_.quantity, alone,
                        counters);
         for (std::size_t c = 0; c < outputs_; ++c) {

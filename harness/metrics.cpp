@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace nullmark {
 namespace {
@@ -100,6 +101,17 @@ const std::vector<std::string>& metric_names() {
                                                   "variance_x_lookups_theory",
                                                   "sample_rmse_theory",
                                                   "weighted_cost_theory"};
+  return kNames;
+}
+
+const std::vector<std::string>& claimable_metric_names() {
+  static const std::vector<std::string> kNames = [] {
+    const std::set<std::string_view> without_error = {"kurtosis",      "relative_variance", "ns_per_sample", "ns_per_lookup",
+                                                      "weighted_cost", "draws_per_sample",  "variance_x_ns"};
+    std::vector<std::string> names = metric_names();
+    std::erase_if(names, [&](const std::string& name) { return without_error.count(name) > 0; });
+    return names;
+  }();
   return kNames;
 }
 
@@ -203,7 +215,8 @@ std::optional<Real> standard_error(const CellRecord& record, std::string_view na
     return rmse && factor ? std::optional(*rmse * std::sqrt(std::max<Real>(1, *factor) / (2 * static_cast<Real>(record.rays))))
                           : std::nullopt;
   }
-  if (name == "samples_per_ray" || name == "largest_sample" || name == "majorant_violations" || name == "majorant_cells") return 0;
+  if (name == "samples_per_ray" || name == "largest_sample" || name == "majorant_violations" || name == "majorant_cells")
+    return 0;
   return std::nullopt;
 }
 

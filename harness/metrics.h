@@ -15,6 +15,9 @@ inline constexpr Real kHeavyTail = 100;
 /// What a table may show.
 const std::vector<std::string>& metric_names();
 
+/// Those of them that have a standard error, so that a claim on them can be decided.
+const std::vector<std::string>& claimable_metric_names();
+
 /// A metric of a cell, averaged over its channels (root mean square for "rmse"), and what theory says of it; nothing where it is
 /// not known.
 std::optional<Real> metric(const CellRecord& record, std::string_view name);

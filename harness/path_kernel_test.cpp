@@ -74,7 +74,7 @@ struct SpectralTracking {
   }
   /// Told by every walk that ended so.
   inline static std::uint64_t absorbed = 0;
-  Event<Value> event(const Walk& walk, const Ray&) const {
+  Event<Value> event(const Walk& walk, const Ray&, const Flight&) const {
     absorbed += walk.event.kind == EventKind::absorb;
     return walk.event;
   }

@@ -168,7 +168,7 @@ Json definitions() {
        {{{"type", "number"}}, list_of({{"type", "number"}}, 1), {{"const", "theory"}}, one_or_list(reference("cells"))}}};
   const Json part = closed_object(
       {{"says", described({{"type", "string"}}, "this part of the claim in words")},
-       {"metric", metric},
+       {"metric", {{"enum", claimable_metric_names()}}},
        {"cells", one_or_list(reference("cells"))},
        {"near", described(compared, "a number, one for each cell, \"theory\" of each cell, or the same metric of a counterpart")},
        {"at_most", compared},

@@ -128,7 +128,8 @@ class EstimatorWalker final : public Walker<Value> {
   std::unique_ptr<WalkMemory> memory() const override { return std::make_unique<State>(); }
 
   bool samples_events(int channels) const override {
-    if constexpr (!requires(const Walk& walk, const Along& ray) { estimator_.event(walk, ray); }) return false;
+    if constexpr (!requires(const Walk& walk, const Along& ray, const Flight& at) { estimator_.event(walk, ray, at); })
+      return false;
     if constexpr (requires { estimator_.samples_events(channels); }) return estimator_.samples_events(channels);
     return true;
   }
@@ -176,8 +177,8 @@ class EstimatorWalker final : public Walker<Value> {
                    Counters& counters) const override {
     State& state = static_cast<State&>(memory);
     if constexpr (requires { state.ray.throughput = throughput; }) state.ray.throughput = throughput;
-    walk(state, course, rng, patience, counters);
-    if constexpr (requires { estimator_.event(state.walk, state.ray); }) return estimator_.event(state.walk, state.ray);
+    [[maybe_unused]] const Flight at = walk(state, course, rng, patience, counters);
+    if constexpr (requires { estimator_.event(state.walk, state.ray, at); }) return estimator_.event(state.walk, state.ray, at);
     return {};
   }
 
@@ -190,7 +191,8 @@ class EstimatorWalker final : public Walker<Value> {
   }
 
  private:
-  void walk(State& state, const Course<Value>& course, Rng& rng, Patience& patience, Counters& counters) const {
+  /// Walks to the end and tells where that is.
+  Flight walk(State& state, const Course<Value>& course, Rng& rng, Patience& patience, Counters& counters) const {
     Flight flight;
     flight.start(state.ray.majorant);
     estimator_.init(state.walk, state.ray, flight, rng);
@@ -215,6 +217,7 @@ class EstimatorWalker final : public Walker<Value> {
       if constexpr (requires { estimator_.real_collisions(state.walk, state.ray); })
         counters.null_collisions -= static_cast<std::uint64_t>(estimator_.real_collisions(state.walk, state.ray));
     }
+    return flight;
   }
 
   static void audit(const Along& ray, const Flight& at, const Value& extinction, Counters& counters) {

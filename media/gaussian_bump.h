@@ -9,6 +9,9 @@ namespace nullmark {
 /// exp(-(s - center)^2 / (2 sigma^2)), s in [0,1]: what the bump adds and the hole takes away.
 struct Bell {
   Real center = 0.32, sigma = 0.05;
+  Real inverse_width = 0;  ///< 1 / (sqrt(2) sigma)
+
+  void prepare() { inverse_width = 1 / (sigma * std::numbers::sqrt2); }
 
   void parameters(ParameterVisitor& visit) {
     visit.number("center", center, Range::between(-1e3, 1e3), "", "centre as a fraction of the axis, may lie outside [0,1]");
@@ -18,7 +21,7 @@ struct Bell {
   /// (s - center) / (sqrt(2) sigma); the bell is exp(-z^2), 1 minus it is -expm1(-z^2).
   template <class S>
   S z(const S& s) const {
-    return (s - center) / (sigma * std::numbers::sqrt2);
+    return (s - center) * inverse_width;
   }
   template <class S>
   S value(const S& s) const {
@@ -70,6 +73,8 @@ struct GaussianBumpProfile {
     visit.number("amplitude", amplitude, Range::non_negative(), "1/length", "extinction at the centre");
     bell.parameters(visit);
   }
+
+  void prepare() { bell.prepare(); }
 
   template <class S>
   S value(const S& s) const {

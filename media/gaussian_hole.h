@@ -20,7 +20,8 @@ struct GaussianHoleProfile {
     bell.parameters(visit);
   }
 
-  void prepare() const {
+  void prepare() {
+    bell.prepare();
     if (!(depth <= level))
       throw ParameterError("depth", "depth " + std::to_string(depth) + " exceeds level " + std::to_string(level) +
                                         ": the extinction would be negative at the centre; expected depth <= level");

@@ -30,9 +30,10 @@ struct PlantedDecompositionStart : AnalogDecompositionTracking<Value> {
     return true;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    Base::consume(walk, ray, at, extinction, rng);
-    if (walk.done) walk.distance = walk.collision;
+  Event<Value> event(const Walk& walk, const Ray& ray, const Flight& at) const {
+    Event<Value> event = Base::event(walk, ray, at);
+    if (walk.looked_up) event.distance = walk.collision;
+    return event;
   }
 };
 

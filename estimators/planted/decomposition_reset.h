@@ -68,7 +68,7 @@ struct PlantedDecompositionReset {
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray) const {
+  Event<Value> event(const Walk& walk, const Ray& ray, const Flight&) const {
     return {walk.distance < ray.end ? EventKind::collision : EventKind::escape, walk.distance, ray.value(1)};
   }
 

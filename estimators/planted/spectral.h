@@ -22,11 +22,8 @@ struct PlantedSpectralSum : SpectralTracking<Value> {
     const Coefficients<Value> mu(extinction, ray.albedo, at.rate());
     const Real u = rng.uniform() * at.rate(), absorb = largest(mu.absorb), scatter = largest(mu.scatter);
     const EventKind kind = u < absorb ? EventKind::absorb : u < absorb + scatter ? EventKind::scatter : EventKind::escape;
-    if (kind != EventKind::escape) {
-      walk.kind = kind;
-      walk.distance = at.position();
-      walk.looked_up = true;
-    }
+    walk.kind = kind;
+    walk.looked_up = kind != EventKind::escape;
     walk.weight *= mu.of(kind) / largest(mu.of(kind));
   }
 };

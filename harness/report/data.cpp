@@ -187,6 +187,8 @@ Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& image
 
 const char* word(BreakEven::Kind kind) {
   switch (kind) {
+    case BreakEven::Kind::first_sample:
+      return "cheaper until its first sample";
     case BreakEven::Kind::never_cheaper:
       return "never cheaper";
     case BreakEven::Kind::no_floor_seen:

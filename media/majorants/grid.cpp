@@ -18,8 +18,7 @@ GridMajorant::GridMajorant(const Medium& medium, const std::array<int, 3>& resol
     for (int y = 0; y < resolution_[1]; ++y)
       for (int x = 0; x < resolution_[0]; ++x) {
         const Vec3 lo = box_.lo + Vec3(x, y, z).cwiseProduct(size);
-        cells_[static_cast<std::size_t>((z * resolution_[1] + y) * resolution_[0] + x)] =
-            medium.extrema({lo - margin, lo + size + margin});
+        cells_[index({x, y, z})] = medium.extrema({lo - margin, lo + size + margin});
       }
   });
   for (const Extrema& cell : cells_) expect_finite(cell.maximum.maxCoeff());

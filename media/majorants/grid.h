@@ -18,8 +18,11 @@ class GridMajorant final : public MajorantStructure {
   StructureSize size() const override { return {cells_.size(), 0, sizeof *this + cells_.size() * sizeof(Extrema)}; }
 
  private:
-  const Extrema& cell(const std::array<int, 3>& at) const {
-    return cells_[static_cast<std::size_t>((at[2] * resolution_[1] + at[1]) * resolution_[0] + at[0])];
+  const Extrema& cell(const std::array<int, 3>& at) const { return cells_[index(at)]; }
+
+  std::size_t index(const std::array<int, 3>& at) const {
+    const int cell = (at[2] * resolution_[1] + at[1]) * resolution_[0] + at[0];  // of 512^3 at most
+    return static_cast<std::size_t>(cell);
   }
 
   std::array<int, 3> resolution_;
