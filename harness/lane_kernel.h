@@ -150,7 +150,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       if constexpr (!requires { E::kIgnoresMajorant; }) counters.null_collisions += tally.lookups - tally.real;
     }
 
-    void set_out(std::size_t k, Mask there, Tally& tally) {
+    [[gnu::noinline]] void set_out(std::size_t k, Mask there, Tally& tally) {
       Walks walks;
       walks.stream = Streams::seeded({first.key, first.ray, first.sample + k});
       walks.sample = Index::counting_from(static_cast<typename Index::Number>(k));
@@ -220,7 +220,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     }
 
     /// Hands out what the dead have left and moves the living together; tells how many lanes they take.
-    std::size_t close_ranks(std::size_t lanes, Tally& tally) {
+    [[gnu::noinline]] std::size_t close_ranks(std::size_t lanes, Tally& tally) {
       std::size_t kept = 0;
       for (std::size_t k = 0; k < lanes; k += N) {
         const Mask alive = Mask::load(&state.alive[k / N * kMaskBytes]);

@@ -83,7 +83,7 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
 }
 
 /// A cell that was never sampled.
-inline CellRecord unsampled(CellRecord record, Status status, const std::string& reason) {
+inline CellRecord unsampled(const CellRecord& record, Status status, const std::string& reason) {
   CellRecord bare;
   bare.cell = record.cell;
   bare.medium = record.medium;
