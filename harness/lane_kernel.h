@@ -110,7 +110,8 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     std::size_t dead = 0;   ///< lanes that step in vain
   };
 
-  /// One block of samples on its way.
+  /// One block of samples on its way.  What runs once a block is not inlined: the code of a step then does not depend on how much
+  /// else its file holds.
   struct Run {
     const LaneKernel& kernel;
     State& state;
