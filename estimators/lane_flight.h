@@ -5,52 +5,64 @@
 
 namespace nullmark {
 
-/// Flight for N walks of one ray side by side: the same steps in the same order for every lane.
+/// The rates that all walks of a ray fly through, rounded to T.
 template <class T, std::size_t N>
+class LaneCourse {
+ public:
+  using Pack = Lanes<T, N>;
+  using Index = LaneIndex<T, N>;
+
+  LaneCourse() = default;
+  explicit LaneCourse(const Rates& rates)
+      : pieces_(rates.size() > 0 ? rates.pieces<T>() : &kVacuum),
+        last_(rates.size() > 0 ? static_cast<Number>(rates.size()) - 1 : 0),
+        begin_(static_cast<T>(rates.begin())),
+        end_(static_cast<T>(rates.end())),
+        total_(static_cast<T>(rates.total_depth())),
+        rewinds_(last_ > 0 && rates.crossing() == Crossing::rewind) {}
+
+  bool has_several() const { return last_ > 0; }
+  template <bool several>
+  Pack rate(Index piece) const {
+    return of<several, &RatePiece<T>::rate>(piece);
+  }
+
+ private:
+  template <class, std::size_t, bool>
+  friend class LaneFlight;
+  using Number = typename Index::Number;
+  static constexpr RatePiece<T> kVacuum{};
+
+  template <bool several, auto member>
+  [[gnu::always_inline]] Pack of(Index piece) const {
+    static_assert(sizeof(RatePiece<T>) == 6 * sizeof(T));
+    return !several || last_ == 0 ? Pack(pieces_->*member) : piece.template gathered<6>(&(pieces_->*member));
+  }
+
+  const RatePiece<T>* pieces_ = &kVacuum;
+  Number last_ = 0;
+  T begin_ = 0, end_ = 0, total_ = 0;
+  bool rewinds_ = false;
+};
+
+/// Where N walks are.
+template <class T, std::size_t N>
+struct LanePlace {
+  Lanes<T, N> depth, position;
+  LaneIndex<T, N> piece;
+};
+
+/// Flight for N walks of one ray side by side: the same steps in the same order for every lane.  Without `several` the course has
+/// one piece, as with one bound for the whole ray, and nothing is asked about others.
+template <class T, std::size_t N, bool several = true>
 class LaneFlight {
  public:
   using Pack = Lanes<T, N>;
   using Mask = LaneMask<T, N>;
   using Index = LaneIndex<T, N>;
   using Streams = LaneRng<T, N>;
-
-  /// The rates that all walks of a ray fly through, rounded to T.
-  class Course {
-   public:
-    Course() = default;
-    explicit Course(const Rates& rates)
-        : pieces_(rates.size() > 0 ? rates.pieces<T>() : &kVacuum),
-          last_(rates.size() > 0 ? static_cast<Number>(rates.size()) - 1 : 0),
-          begin_(static_cast<T>(rates.begin())),
-          end_(static_cast<T>(rates.end())),
-          total_(static_cast<T>(rates.total_depth())),
-          rewinds_(last_ > 0 && rates.crossing() == Crossing::rewind) {}
-
-    bool has_several() const { return last_ > 0; }
-    Pack rate(Index piece) const { return of<&RatePiece<T>::rate>(piece); }
-
-   private:
-    friend LaneFlight;
-    using Number = typename Index::Number;
-    static constexpr RatePiece<T> kVacuum{};
-
-    template <auto member>
-    [[gnu::always_inline]] Pack of(Index piece) const {
-      static_assert(sizeof(RatePiece<T>) == 6 * sizeof(T));
-      return last_ == 0 ? Pack(pieces_->*member) : piece.template gathered<6>(&(pieces_->*member));
-    }
-
-    const RatePiece<T>* pieces_ = &kVacuum;
-    Number last_ = 0;
-    T begin_ = 0, end_ = 0, total_ = 0;
-    bool rewinds_ = false;
-  };
-
-  /// Where the walks are.
-  struct Place {
-    Pack depth, position;
-    Index piece;
-  };
+  using Course = LaneCourse<T, N>;
+  using Place = LanePlace<T, N>;
 
   LaneFlight(Course& course, Place& at) : course_(course), at_(at) {}
 
@@ -63,9 +75,9 @@ class LaneFlight {
 
   /// Lanes whose walk is no longer alive leave with this step.
   [[gnu::always_inline]] Mask next(Streams& rng, Mask alive) {
-    const Pack depth = at_.depth + rng.exponential();
+    const Pack depth = rng.exponential_beyond(at_.depth);
     rng.forget(!alive);
-    if (course_.rewinds_) {
+    if (several && course_.rewinds_) {
       // By value: what a call could reach would not stay in registers.
       const Rewound rewound = rewind(course_, at_, depth, rng.state(), rng.alive(), alive);
       at_ = rewound.at;
@@ -79,9 +91,9 @@ class LaneFlight {
   [[gnu::always_inline]] Mask advance_to(Pack depth, Mask alive = true) {
     const Mask inside = alive & (depth < Pack(course_.total_));
     at_.depth = depth;
-    if (course_.last_ > 0) {
+    if (several && course_.last_ > 0) {
       for (;;) {
-        const Mask behind = inside & !(depth < course_.template of<&RatePiece<T>::depth_after>(at_.piece));
+        const Mask behind = inside & !(depth < course_.template of<several, &RatePiece<T>::depth_after>(at_.piece));
         if (none(behind)) break;
         at_.piece = select(behind, at_.piece + Index(1), at_.piece);
       }
@@ -94,7 +106,7 @@ class LaneFlight {
 
   Pack position() const { return at_.position; }
   Index piece() const { return at_.piece; }
-  Pack rate() const { return course_.rate(at_.piece); }
+  Pack rate() const { return course_.template rate<several>(at_.piece); }
   Pack depth() const { return at_.depth; }
   Pack depth_left() const { return Pack(course_.total_) - at_.depth; }
   Pack total_depth() const { return course_.total_; }
@@ -109,9 +121,11 @@ class LaneFlight {
 
   [[gnu::always_inline]] static Pack position(const Course& course, const Place& at) {
     using Piece = RatePiece<T>;
-    const Pack begin = course.template of<&Piece::begin>(at.piece), end = course.template of<&Piece::end>(at.piece);
-    const Pack before = course.template of<&Piece::depth_before>(at.piece);
-    return smaller(end, begin + (at.depth - before) * course.template of<&Piece::inverse_rate>(at.piece));
+    const Pack begin = course.template of<several, &Piece::begin>(at.piece);
+    const Pack end = course.template of<several, &Piece::end>(at.piece);
+    Pack within = at.depth;
+    if constexpr (several) within = within - course.template of<several, &Piece::depth_before>(at.piece);
+    return smaller(end, begin + within * course.template of<several, &Piece::inverse_rate>(at.piece));
   }
 
   /// See Flight::rewind.
@@ -121,12 +135,12 @@ class LaneFlight {
     const Index last(course.last_);
     Mask inside = false;
     for (;;) {
-      Pack after = course.template of<&RatePiece<T>::depth_after>(at.piece);
+      Pack after = course.template of<several, &RatePiece<T>::depth_after>(at.piece);
       for (;;) {
         const Mask behind = flying & !(at.depth < after) & (at.piece < last);
         if (none(behind)) break;
         at.piece = select(behind, at.piece + Index(1), at.piece);
-        after = course.template of<&RatePiece<T>::depth_after>(at.piece);
+        after = course.template of<several, &RatePiece<T>::depth_after>(at.piece);
       }
       flying = flying & (at.depth < after);
       const Mask lands = flying & (depth < after);

@@ -40,7 +40,13 @@ class LaneRng {
     return negative_logarithm(Pack(1) - fraction());
   }
 
-  /// The same where only the lanes of the mask draw; the others' streams stay where they were.
+  /// x + exponential(), without turning the logarithm's sign on the way.
+  [[gnu::always_inline]] Pack exponential_beyond(Pack x) {
+    draws_ += living_;
+    return x - logarithm(Pack(1) - fraction());
+  }
+
+  /// exponential() where only the lanes of the mask draw; the others' streams stay where they were.
   Pack exponential(Mask lanes) {
     const State before = state_;
     draws_ += count(lanes & alive_);

@@ -33,11 +33,12 @@ class KernelBench {
     scene_.majorant = std::make_shared<BuiltMajorant>(BuiltMajorant{make_majorant(majorant)->build(medium_)});
   }
 
-  /// 256 samples of new addresses, which share the ray's preparation and one traversal of the majorant.
+  /// Samples of new addresses, which share the ray's preparation and one traversal of the majorant.  A cell that is judged draws
+  /// thousands of a ray.
   void draw() {
     scene_.context(0, *kernel_, context_);
     kernel_->begin_ray(*workspace_, *medium_, extrema_, context_);
-    kernel_->sample(*workspace_, *medium_, context_, 1, counters_.samples, 256, Quantity::transmittance, block_, counters_);
+    kernel_->sample(*workspace_, *medium_, context_, 1, counters_.samples, 1024, Quantity::transmittance, block_, counters_);
     benchmark::DoNotOptimize(block_.values.data());
     benchmark::ClobberMemory();
   }

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
+#include <limits>
 
 #include "media/types.h"
 
@@ -13,6 +15,12 @@ inline constexpr std::size_t kEight = sizeof(Eight) / sizeof(Real);
 
 inline void load(const Real* from, Eight& to) { std::memcpy(&to, from, sizeof to); }
 inline void store(const Eight& from, Real* to) { std::memcpy(to, &from, sizeof from); }
+
+inline Eight magnitude(const Eight& x) {
+  using Bits [[gnu::vector_size(sizeof(Eight))]] = std::int64_t;
+  constexpr std::int64_t kAllButSign = std::numeric_limits<std::int64_t>::max();
+  return reinterpret_cast<Eight>(reinterpret_cast<Bits>(x) & kAllButSign);
+}
 
 inline Real total(const Eight& x) { return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7])); }
 

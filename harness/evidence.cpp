@@ -11,10 +11,6 @@
 namespace nullmark {
 namespace {
 
-/// Largest factor: more than that is not won at once.  Its kTogether-th power is finite.
-constexpr Real kMostWon = 0x1p30;
-constexpr std::size_t kTogether = 32;
-
 /// Products in lanes, of any size: mantissas in [1, 2) and powers of two apart, so that logarithms are taken once at the end.
 class Products {
  public:
@@ -56,63 +52,165 @@ class Products {
   Integers exponent_{};
 };
 
-/// Sum of log won(s) - log lost(s); `factor` multiplies the two products by a sum's, won <= kMostWon.  A sum `neutral` has
-/// factor 1.
-template <class Factor>
-Real sum_of_logs(std::span<const Real> sums, Real neutral, Factor factor) {
-  // A wealth that is lost for good; what this adds to its expectation is nothing.
-  constexpr Real kLost = 1e-300;
-  constexpr std::size_t kChains = 4;  // that do not wait for each other
-  const Eight least = Eight{} + kLost, most = Eight{} + 1 / kLost;
-  Products products;
-  for (std::size_t i = 0; i < sums.size();) {
-    std::array<Eight, kChains> won, lost;
-    won.fill(Eight{} + 1);
-    lost.fill(Eight{} + 1);
-    Eight x;
-    for (std::size_t k = 0; k < kTogether && i + kChains * kEight <= sums.size(); ++k)
-      for (std::size_t chain = 0; chain < kChains; ++chain, i += kEight) {
-        load(&sums[i], x);
-        factor(x, won[chain], lost[chain]);
-      }
-    if (sums.size() - i < kChains * kEight)
-      for (std::size_t chain = 0; i < sums.size(); ++chain, i += kEight) {
-        std::array<Real, kEight> rest;
-        rest.fill(neutral);
-        std::copy_n(&sums[i], std::min(kEight, sums.size() - i), rest.data());
-        load(rest.data(), x);
-        factor(x, won[chain], lost[chain]);
-      }
-    for (std::size_t chain = 0; chain < kChains; ++chain) {
-      products.multiply(won[chain] > least ? won[chain] : least, 1);
-      products.multiply(lost[chain] < most ? lost[chain] : most, -1);
+/// Sums that all bets are placed on before the next are read: they stay near.
+constexpr std::size_t kBlock = 2048;
+constexpr std::size_t kChains = 2;  // of factors, that do not wait for each other
+using Chains = std::array<Eight, kChains>;
+
+/// Factors of any size.  More than kMostWon is not won at once; kTogether of them have a finite product.
+struct Wild {
+  static constexpr Real kMostWon = 0x1p30;
+  static constexpr std::size_t kTogether = 32;
+  static Eight won(const Eight& f) { return f < kMostWon ? f : Eight{} + kMostWon; }
+  static void take(const Chains& factors, Products& products, int sign) {
+    // A wealth that is lost for good; what this adds to its expectation is nothing.
+    const Eight least = Eight{} + 1e-300, most = Eight{} + 1e300;
+    for (const Eight& x : factors) {
+      const Eight above = x > least ? x : least;
+      products.multiply(above < most ? above : most, sign);
     }
   }
-  return products.log();
+};
+
+/// Factors between 1/kMost and kMost: kTogether of them can be multiplied without a second look, and so can the chains.
+struct Calm {
+  static constexpr Real kMost = 16;
+  static constexpr std::size_t kTogether = 64;
+  static Eight won(const Eight& f) { return f; }
+  static void take(const Chains& factors, Products& products, int sign) { products.multiply(factors[0] * factors[1], sign); }
+};
+
+/// One or two rates of a bet on their way.
+class Wager {
+ public:
+  static constexpr std::size_t kRates = 2;
+
+  /// `least` and `most` of the sums to come.
+  Wager(const Bet& bet, std::span<const Real> rates, int errors_per_sum, Real least, Real most)
+      : kind_(bet.kind), count_(rates.size()), side_(bet.side), neutral_(bet.limit * errors_per_sum) {
+    for (std::size_t r = 0; r < count_; ++r) {
+      rate_[r] = rates[r];
+      const Real l = rate_[r] * side_;
+      const auto [low, high] = std::minmax({l * (least - neutral_), l * (most - neutral_)});
+      if (kind_ == Bet::Kind::betting) {
+        calm_ = calm_ && 1 + low >= 1 / Calm::kMost && 1 + high <= Calm::kMost;
+      } else {
+        const Real size = std::max(-low, high);
+        calm_ = calm_ && 1 + size * (1 + size / 2) <= Calm::kMost;
+      }
+    }
+  }
+
+  /// At most kBlock sums.
+  void place(std::span<const Real> sums) {
+    if (calm_)
+      count_ == 1 ? place<Calm, 1>(sums) : place<Calm, 2>(sums);
+    else
+      count_ == 1 ? place<Wild, 1>(sums) : place<Wild, 2>(sums);
+  }
+
+  void append_logs(std::vector<Real>& logs) const {
+    for (std::size_t r = 0; r < count_; ++r) logs.push_back(products_[r].log());
+  }
+
+ private:
+  template <class Size, std::size_t count>
+  void place(std::span<const Real> sums) {
+    if (kind_ == Bet::Kind::betting) {
+      std::array<Real, count> l, start;
+      for (std::size_t r = 0; r < count; ++r) l[r] = rate_[r] * side_, start[r] = 1 - l[r] * neutral_;
+      multiply<Size, count, false>(sums, [=](const Eight& x, std::size_t chain, auto& won, auto&) {
+        for (std::size_t r = 0; r < count; ++r) won[r][chain] *= Size::won(start[r] + l[r] * x);
+      });
+    } else {
+      std::array<Real, count> rate;
+      std::copy_n(rate_.begin(), count, rate.begin());
+      multiply<Size, count, true>(
+          sums, [rate, side = side_, neutral = neutral_](const Eight& x, std::size_t chain, auto& won, auto& lost) {
+            const Eight gain = side * (x - neutral), size = magnitude(gain);
+            for (std::size_t r = 0; r < count; ++r) {
+              const Eight y = rate[r] * size, f = 1 + y * (1 + y / 2);
+              won[r][chain] = gain < 0 ? won[r][chain] : won[r][chain] * Size::won(f);
+              lost[r][chain] = gain < 0 ? lost[r][chain] * f : lost[r][chain];
+            }
+          });
+    }
+  }
+
+  /// `factor` multiplies the products of what is won and lost by those of eight sums, chain by chain.
+  template <class Size, std::size_t count, bool loses, class Factor>
+  void multiply(std::span<const Real> sums, const Factor& factor) {
+    for (std::size_t i = 0; i < sums.size();) {
+      std::array<Chains, count> won, lost;
+      for (std::size_t r = 0; r < count; ++r) won[r].fill(Eight{} + 1), lost[r].fill(Eight{} + 1);
+      Eight x;
+      for (std::size_t k = 0; k < Size::kTogether && i + kChains * kEight <= sums.size(); ++k)
+        for (std::size_t chain = 0; chain < kChains; ++chain, i += kEight) {
+          load(&sums[i], x);
+          factor(x, chain, won, lost);
+        }
+      if (sums.size() - i < kChains * kEight)
+        for (std::size_t chain = 0; i < sums.size(); ++chain, i += kEight) {
+          std::array<Real, kEight> rest;
+          rest.fill(neutral_);  // whose factor is 1
+          std::copy_n(&sums[i], std::min(kEight, sums.size() - i), rest.data());
+          load(rest.data(), x);
+          factor(x, chain, won, lost);
+        }
+      for (std::size_t r = 0; r < count; ++r) {
+        Size::take(won[r], products_[r], 1);
+        if constexpr (loses) Size::take(lost[r], products_[r], -1);
+      }
+    }
+  }
+
+  Bet::Kind kind_;
+  std::size_t count_;
+  Real side_, neutral_;
+  std::array<Real, kRates> rate_{};
+  bool calm_ = true;
+  std::array<Products, kRates> products_;
+};
+
+/// Least and most, infinite where not all are finite.
+std::pair<Real, Real> extent(std::span<const Real> x) {
+  Eight least = Eight{} + kInfinity, most = -least, nothing{}, each;
+  std::size_t i = 0;
+  for (; i + kEight <= x.size(); i += kEight) {
+    load(&x[i], each);
+    least = each < least ? each : least;
+    most = each > most ? each : most;
+    nothing += each - each;
+  }
+  std::pair<Real, Real> ends(kInfinity, -kInfinity);
+  Real rest = total(nothing);
+  for (std::size_t lane = 0; lane < kEight; ++lane) ends = {std::min(ends.first, least[lane]), std::max(ends.second, most[lane])};
+  for (; i < x.size(); ++i) {
+    ends = {std::min(ends.first, x[i]), std::max(ends.second, x[i])};
+    rest += x[i] - x[i];
+  }
+  return rest == 0 ? ends : std::pair(-kInfinity, kInfinity);
 }
 
 }  // namespace
 
-std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums, int errors_per_sum) {
+std::vector<Real> bet_on(std::span<const Bet* const> bets, std::span<const Real> sums, int errors_per_sum) {
+  const auto [least, most] = extent(sums);
+  std::vector<Wager> wagers;
+  for (const Bet* bet : bets)
+    for (std::size_t r = 0; r < bet->rates.size(); r += Wager::kRates)
+      wagers.emplace_back(*bet, std::span(bet->rates).subspan(r, std::min(Wager::kRates, bet->rates.size() - r)), errors_per_sum,
+                          least, most);
+  for (std::size_t i = 0; i < sums.size(); i += kBlock)
+    for (Wager& wager : wagers) wager.place(sums.subspan(i, std::min(kBlock, sums.size() - i)));
   std::vector<Real> logs;
-  const Real shift = bet.limit * errors_per_sum;
-  for (const Real rate : bet.rates) {
-    const Real l = rate * bet.side;
-    const Real start = -l * shift;
-    if (bet.kind == Bet::Kind::betting) {
-      logs.push_back(sum_of_logs(sums, shift, [=](const Eight& x, Eight& won, Eight&) {
-        const Eight f = (1 + start) + l * x;
-        won *= f < kMostWon ? f : Eight{} + kMostWon;
-      }));
-    } else {
-      logs.push_back(sum_of_logs(sums, shift, [=](const Eight& x, Eight& won, Eight& lost) {
-        const Eight one = Eight{} + 1, y = start + l * x, size = y < 0 ? -y : y, f = 1 + size * (1 + size / 2);
-        won *= y < 0 ? one : f < kMostWon ? f : Eight{} + kMostWon;
-        lost *= y < 0 ? f : one;
-      }));
-    }
-  }
+  for (const Wager& wager : wagers) wager.append_logs(logs);
   return logs;
+}
+
+std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums, int errors_per_sum) {
+  const Bet* const one = &bet;
+  return bet_on(std::span(&one, 1), sums, errors_per_sum);
 }
 
 Real log_denominator(const Bet& bet, Real rate, std::uint64_t sums, int errors_per_sum) {

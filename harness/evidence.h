@@ -32,6 +32,9 @@ struct Bet {
 /// the logs of shards gives the log of the whole.
 std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums, int errors_per_sum);
 
+/// The same for several bets on the same sums, one after the other.
+std::vector<Real> bet_on(std::span<const Bet* const> bets, std::span<const Real> sums, int errors_per_sum);
+
 /// log((1 + l^2 b v/2)^sums) of a Catoni bet at rate l; 0 for a betting one.
 Real log_denominator(const Bet& bet, Real rate, std::uint64_t sums, int errors_per_sum);
 

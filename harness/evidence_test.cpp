@@ -143,6 +143,15 @@ TEST(Evidence, HugeErrorsAreFinite) {
         }
       }
     }
+  // One that is none of the numbers among tame ones.
+  for (const Real odd : {std::numeric_limits<Real>::quiet_NaN(), kInfinity, -kInfinity})
+    for (const std::size_t at : {0u, 70u, 4095u, 4100u})
+      for (const int side : {-1, 1}) {
+        std::vector<Real> sums = uniforms(4101, -1, 1);
+        sums[at] = odd;
+        for (const Bet::Kind kind : {Bet::Kind::betting, Bet::Kind::catoni})
+          for (const Real log : bet_on({kind, side, 0, 1, {1e-3, 0.3}}, sums, 1)) EXPECT_TRUE(std::isfinite(log)) << odd;
+      }
   // The cap lowers wealth: what a single error wins is bounded, what it loses is not forgotten.
   const Bet down{Bet::Kind::betting, -1, 0, 0, {0.25}};
   const std::vector<Real> ruin(3000, 4 - 1e-12);

@@ -202,21 +202,16 @@ class Trial {
 
   /// `count` further samples of every ray.
   void draw(std::uint64_t count) {
-    const int together = subject_.lookups ? gate_.lookups_per_sum : gate_.errors_per_sum;
-    sums_.resize(count / static_cast<std::uint64_t>(together));
+    errors_.resize(count);
     for (std::size_t ray = 0; ray < subject_.rays.size(); ++ray) {
       Real largest = 0;
       const Law& law = subject_.rays[ray];
       const Real mean = subject_.claimed.empty() ? law.mean() : subject_.claimed[ray];
-      for (Real& sum : sums_) {
-        sum = 0;
-        for (int i = 0; i < together; ++i) {
-          const Real error = subject_.constant ? mean * (rng_.uniform() - 0.5) * 1e-15 : law.draw(rng_) - mean;
-          sum += error;
-          squares_ += error * error;
-          largest = std::max(largest, std::abs(error));
-        }
-        total_ += sum;
+      for (Real& error : errors_) {
+        error = subject_.constant ? mean * (rng_.uniform() - 0.5) * 1e-15 : law.draw(rng_) - mean;
+        total_ += error;
+        squares_ += error * error;
+        largest = std::max(largest, std::abs(error));
       }
       for (std::size_t i = 0; i < gate_.tests.size(); ++i) {
         const MeanTest& test = gate_.tests[i];
@@ -224,7 +219,7 @@ class Trial {
         if (test.deterministic)
           evidence_[i].largest_error = std::max(evidence_[i].largest_error, largest);
         else
-          evidence_[i].add(test, sums_, together);
+          evidence_[i].add(test, sums(static_cast<std::size_t>(test.errors_per_sum)));
       }
     }
     samples_ += count;
@@ -241,7 +236,7 @@ class Trial {
       MeanTest test = gate_.tests[i];
       if (forget_denominators)
         for (auto& [role, bet] : test.bets) bet.variance = 0;
-      verdict.tests.push_back(test_record(test, evidence_[i], subject_.lookups ? gate_.lookups_per_sum : gate_.errors_per_sum));
+      verdict.tests.push_back(test_record(test, evidence_[i]));
     }
     decide(verdict);
     return verdict;
@@ -257,11 +252,18 @@ class Trial {
   std::uint64_t samples() const { return samples_; }
 
  private:
+  /// Of so many consecutive errors each.
+  const std::vector<Real>& sums(std::size_t together) {
+    sums_.assign(errors_.size() / together, 0);
+    for (std::size_t i = 0; i < errors_.size(); ++i) sums_[i / together] += errors_[i];
+    return sums_;
+  }
+
   const Subject& subject_;
   const CellGate& gate_;
   PlainRng rng_;
   std::vector<Evidence> evidence_;
-  std::vector<Real> sums_;
+  std::vector<Real> errors_, sums_;
   Real total_ = 0, squares_ = 0;
   std::uint64_t samples_ = 0;
 };
@@ -490,12 +492,12 @@ TEST(FalseAlarms, PowerAndCost) {
     int together = 1;
     Law summed = row.law;
     constexpr std::size_t kMostValues = 500;
-    while (together < gate.errors_per_sum && summed.size() < kMostValues) {
+    while (together < gate.tests[0].errors_per_sum && summed.size() < kMostValues) {
       summed = summed.doubled();
       together *= 2;
     }
     const std::uint64_t most = kPatience * gate.planned;
-    const int draws = gate.errors_per_sum / together;
+    const int draws = gate.tests[0].errors_per_sum / together;
     const Real mean = single.claimed[0] * together;
     Result result;
     std::vector<Real> sums;
@@ -505,20 +507,20 @@ TEST(FalseAlarms, PowerAndCost) {
       std::uint64_t samples = 0;
       for (Outcome outcome = Outcome::inconclusive; outcome == Outcome::inconclusive && samples < most;) {
         const std::uint64_t left = (most - samples + 63) / 64 * 64, count = samples == 0 ? kFirst : std::min(samples, left);
-        for (std::uint64_t todo = count / static_cast<std::uint64_t>(gate.errors_per_sum); todo > 0;) {
+        for (std::uint64_t todo = count / static_cast<std::uint64_t>(gate.tests[0].errors_per_sum); todo > 0;) {
           sums.resize(std::min<std::uint64_t>(todo, 4096));
           for (Real& sum : sums) {
             sum = 0;
             for (int i = 0; i < draws; ++i) sum += summed.draw(rng) - mean;
           }
-          evidence.add(gate.tests[0], sums, gate.errors_per_sum);
+          evidence.add(gate.tests[0], sums);
           todo -= sums.size();
         }
         samples += count;
         VerdictRecord verdict;
         verdict.against = gate.against;
         verdict.family = kFamily;
-        verdict.tests = {test_record(gate.tests[0], evidence, gate.errors_per_sum)};
+        verdict.tests = {test_record(gate.tests[0], evidence)};
         decide(verdict);
         outcome = verdict.unbiased;
         result.fail += outcome == Outcome::fail;

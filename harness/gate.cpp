@@ -79,7 +79,8 @@ struct Pool {
   std::size_t rays = 0;
 };
 
-void set_bets(MeanTest& test, const Pool& pool, Real low, Real high, bool analytic, int& errors_per_sum) {
+/// `most_per_sum` errors may share a sum.
+void set_bets(MeanTest& test, const Pool& pool, Real low, Real high, bool analytic, int most_per_sum) {
   const bool bounded_below = std::isfinite(low), bounded_above = std::isfinite(high);
   const Real below = pool.most - low, above = high - pool.least;  // the largest errors down and up
   const Real slack = analytic ? 1 : kPilotSlack;
@@ -106,15 +107,16 @@ void set_bets(MeanTest& test, const Pool& pool, Real low, Real high, bool analyt
 
   // Sums may be as long as a bet at its highest rate still resembles the product over single errors.
   constexpr Real kSmall = 0.5;
+  int& b = test.errors_per_sum = most_per_sum;
   for (const auto& placed : test.bets) {
     const Bet& bet = placed.second;
     const Real rate = bet.rates.back();
-    const auto fits = [&](int b) {
+    const auto fits = [&] {
       if (bet.kind == Kind::catoni) return b * rate * rate * bet.variance <= kSmall * kSmall;
       const Real widest = std::max(bounded_below ? below : 0, bounded_above ? above : 0) + std::abs(bet.limit);
       return b * rate * widest <= kSmall;
     };
-    while (errors_per_sum > 1 && !fits(errors_per_sum)) errors_per_sum /= 2;
+    while (b > 1 && !fits()) b /= 2;
   }
 }
 
@@ -124,11 +126,11 @@ void drop_catoni(MeanTest& test) {
 }
 
 /// Keeps the wealth of betting bets positive.
-void clip_rates(MeanTest& test, const Pool& pool, Real low, Real high, int errors_per_sum) {
+void clip_rates(MeanTest& test, const Pool& pool, Real low, Real high) {
   for (auto& [role, bet] : test.bets) {
     if (bet.kind != Bet::Kind::betting) continue;
     const Real loss = bet.side > 0 ? pool.most - low + bet.limit : high - pool.least - bet.limit;
-    const Real most = loss > 0 ? 0.5 / (loss * errors_per_sum) : kInfinity;
+    const Real most = loss > 0 ? 0.5 / (loss * test.errors_per_sum) : kInfinity;
     for (Real& rate : bet.rates) rate = std::min(rate, most);
   }
 }
@@ -192,13 +194,12 @@ std::vector<int> ray_groups(const BuiltRays& rays) {
   return groups;
 }
 
-void Evidence::add(const MeanTest& test, std::span<const Real> errors, int errors_per_sum) {
-  std::size_t at = 0;
-  for (const auto& [role, bet] : test.bets) {
-    const std::vector<Real> added = bet_on(bet, errors, errors_per_sum);
-    logs.resize(std::max(logs.size(), at + added.size()), 0);
-    for (const Real x : added) logs[at++] += x;
-  }
+void Evidence::add(const MeanTest& test, std::span<const Real> errors) {
+  std::vector<const Bet*> bets;
+  for (const auto& placed : test.bets) bets.push_back(&placed.second);
+  const std::vector<Real> added = bet_on(bets, errors, test.errors_per_sum);
+  logs.resize(std::max(logs.size(), added.size()), 0);
+  for (std::size_t i = 0; i < added.size(); ++i) logs[i] += added[i];
   sums += errors.size();
 }
 
@@ -230,14 +231,14 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
   if (own_mean && !theory.ray_shift.empty()) gate.shift = theory.ray_shift;
   if (!analytic && !pilot) return gate;
 
-  gate.errors_per_sum = gate.lookups_per_sum =
-      static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
+  const int most_per_sum = static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
   const bool bounded = std::isfinite(gate.low) && std::isfinite(gate.high);
   const bool distrusted = !analytic && !bounded && (theory.infinite_variance || pilot->variance_of_variance >= kTrustedVariance);
   std::vector<Pool> pools;
   const Real ulp = epsilon_of(cell.precision);
-  const Real mean_lookups = theory.lookups.value_or(
-      pilot && pilot->samples > 0 ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples) : theory.majorant_depth);
+  const Real mean_lookups =
+      theory.lookups.value_or(pilot && pilot->samples > 0 ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples)
+                                                          : theory.majorant_depth);
   for (std::size_t o = 0; o < outputs; ++o) {
     std::vector<Pool> by_group(static_cast<std::size_t>(groups) + 1);
     for (std::size_t ray = 0; ray < rays; ++ray) {
@@ -278,7 +279,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
       if (test.deterministic)
         test.basis = "deterministic";
       else
-        set_bets(test, pool, gate.low, gate.high, analytic, gate.errors_per_sum);
+        set_bets(test, pool, gate.low, gate.high, analytic, most_per_sum);
       if (distrusted) drop_catoni(test);
       gate.tests.push_back(std::move(test));
     }
@@ -296,7 +297,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
       gate.undecidable =
           fmt::format("the reference's own error {:.2g} is too coarse for epsilon {:.2g}", test.reference_error, test.epsilon);
     if (test.deterministic || test.bets.empty()) continue;
-    clip_rates(test, pools[i], gate.low, gate.high, gate.errors_per_sum);
+    clip_rates(test, pools[i], gate.low, gate.high);
     test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), test.rays);
     gate.planned = std::max(gate.planned, test.planned);
     if (!hardest || test.planned > gate.tests[*hardest].planned) hardest = i;
@@ -349,9 +350,9 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
     if (test.deterministic) {
       test.basis = "deterministic";
     } else {
-      set_bets(test, pool, 0, kInfinity, known_spread, gate.lookups_per_sum);
+      set_bets(test, pool, 0, kInfinity, known_spread, most_per_sum);
       if (!seen) drop_catoni(test);
-      clip_rates(test, pool, 0, kInfinity, gate.lookups_per_sum);
+      clip_rates(test, pool, 0, kInfinity);
       test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), rays);
     }
     gate.tests.push_back(std::move(test));
@@ -359,11 +360,11 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
   return gate;
 }
 
-TestRecord test_record(const MeanTest& test, const Evidence& evidence, int errors_per_sum) {
+TestRecord test_record(const MeanTest& test, const Evidence& evidence) {
   TestRecord record;
   record.channel = test.channel;
   record.group = test.group;
-  record.samples = evidence.sums * static_cast<std::uint64_t>(errors_per_sum);
+  record.samples = evidence.sums * static_cast<std::uint64_t>(test.errors_per_sum);
   record.epsilon = test.epsilon;
   record.reference_error = test.reference_error;
   record.variance = test.variance;
@@ -379,7 +380,7 @@ TestRecord test_record(const MeanTest& test, const Evidence& evidence, int error
   for (const auto& [role, bet] : test.bets)
     for (const Real rate : bet.rates) {
       const Real log = at < evidence.logs.size() ? evidence.logs[at] : 0;
-      wealth[{role, bet.kind}].push_back(log - log_denominator(bet, rate, evidence.sums, errors_per_sum));
+      wealth[{role, bet.kind}].push_back(log - log_denominator(bet, rate, evidence.sums, test.errors_per_sum));
       ++at;
     }
   const auto log_e = [&](Role role) {

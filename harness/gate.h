@@ -43,6 +43,7 @@ struct MeanTest {
   bool deterministic = false;  ///< no variance beyond rounding: every single sample must be right
   std::string basis;           ///< "betting", "catoni", "catoni+betting" or "deterministic"
   std::uint64_t planned = 0;   ///< samples per ray at which PASS is all but certain where there is no bias
+  int errors_per_sum = 1;      ///< b of the bets, a power of two that divides the samples of a ray
   std::vector<std::pair<Role, Bet>> bets;
 };
 
@@ -52,8 +53,7 @@ struct CellGate {
   std::vector<int> group_of;  ///< per ray
   std::vector<Real>
       shift;  ///< [ray * outputs + o], the claimed mean minus the reference, for estimators judged by their own mean
-  std::vector<Real> lookups;  ///< per ray, expected; empty where unknown
-  int errors_per_sum = 1, lookups_per_sum = 1;
+  std::vector<Real> lookups;                ///< per ray, expected; empty where unknown
   Real low = -kInfinity, high = kInfinity;  ///< the declared range of samples
   std::string against;                      ///< "reference" or "own mean"
   std::string variance_basis;               ///< "analytic", "pilot" or "none"
@@ -68,16 +68,17 @@ struct Evidence {
   std::uint64_t sums = 0;
   Real largest_error = 0;
 
-  void add(const MeanTest& test, std::span<const Real> errors, int errors_per_sum);
+  /// Sums of as many errors each as the test asks for.
+  void add(const MeanTest& test, std::span<const Real> errors);
   Evidence& operator+=(const Evidence& other);
 };
 
 /// Variance per ray and channel from a pilot run, where theory has none.
 struct Pilot {
-  std::vector<Real> variance;          ///< [ray * outputs + o]
-  std::vector<Real> lookups_variance;  ///< per ray
+  std::vector<Real> variance;              ///< [ray * outputs + o]
+  std::vector<Real> lookups_variance;      ///< per ray
   std::uint64_t samples = 0, lookups = 0;  ///< of all rays
-  Real variance_of_variance = 0;       ///< largest over outputs of sum d^4/(sum d^2)^2 - 1/n
+  Real variance_of_variance = 0;           ///< largest over outputs of sum d^4/(sum d^2)^2 - 1/n
 };
 
 /// Plans the tests of a cell.  Where the majorant does not bound, ranges that rest on it are not claimed.  `pilot` serves where
@@ -86,7 +87,7 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
                    const CellTheory& theory, const std::optional<Pilot>& pilot, const GateLevels& levels);
 
 /// The figures of a test, ready for the record.
-TestRecord test_record(const MeanTest& test, const Evidence& evidence, int errors_per_sum);
+TestRecord test_record(const MeanTest& test, const Evidence& evidence);
 
 /// Mean tests of a whole configuration, channel by channel and group by group, whatever is selected to run; and lookups tests.
 std::uint64_t mean_family(const Plan& plan);

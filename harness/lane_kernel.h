@@ -39,15 +39,15 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
   using Mask = LaneMask<T, N>;
   using Index = LaneIndex<T, N>;
   using E = Estimator<Pack>;
-  using Flight = LaneFlight<T, N>;
+  using Course = LaneCourse<T, N>;
   using Streams = LaneRng<T, N>;
 
   static constexpr bool kSingle = !std::is_same_v<T, Real>;
-  static constexpr std::size_t kBlock = 256;
+  static constexpr std::size_t kBlock = 2048 / sizeof(T);  ///< walks whose numbers fit the first cache together
 
   /// N walks: registers of the same lanes throughout, which is how they close ranks.
   struct Walks {
-    typename Flight::Place place;
+    LanePlace<T, N> place;
     typename E::Walk walk;
     typename Streams::State stream;
     Index sample;
@@ -70,10 +70,14 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
   struct State final : Base::State {
     /// [number of a walk][walk]; whole registers may be read at the end.
     alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock>, kNumbers> numbers{};
-    alignas(HWY_MAX_BYTES) std::array<T, kBlock> x{}, y{}, z{}, extinction{};
+    alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock>, 3> points{};  ///< [axis][walk]
+    alignas(HWY_MAX_BYTES) std::array<T, kBlock> extinction{};
     alignas(HWY_MAX_BYTES) std::array<T, kBlock> result{};  ///< of walks that have ended, and their lookups
     alignas(HWY_MAX_BYTES) std::array<typename Index::Number, kBlock> steps{};
     std::array<std::uint8_t, kBlock / N * kMaskBytes> alive{};
+    /// What ranks leave behind when they close; whole registers are written at the end.
+    alignas(HWY_MAX_BYTES) std::array<T, kBlock + N> left_result{};
+    alignas(HWY_MAX_BYTES) std::array<typename Index::Number, kBlock + N> left_sample{}, left_steps{};
   };
 
  public:
@@ -122,14 +126,19 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     Real* values;
     std::uint32_t* lookups;
     Counters& counters;
-    typename Flight::Course course = {}, majorant = typename Flight::Course(state.ray.majorant);
+    Course course = {}, majorant = Course(state.ray.majorant);
     std::array<T, 3> origin = narrowed(context.local.origin), direction = narrowed(context.local.direction);
 
     static std::array<T, 3> narrowed(const Vec3& v) {
       return {static_cast<T>(v.x()), static_cast<T>(v.y()), static_cast<T>(v.z())};
     }
 
+    /// Where the ray does not, its points keep the coordinate that they were given when the block began.
+    bool moves_along(std::size_t axis) const { return direction[axis] != 0; }
+
     void block(std::size_t count) {
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (!moves_along(axis)) state.points[axis].fill(origin[axis]);
       Tally tally{.walks = count};
       std::size_t lanes = (count + N - 1) / N * N;
       for (std::size_t k = 0; k < lanes; k += N) set_out(k, Mask::first(std::min(N, count - k)), tally);
@@ -140,8 +149,12 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
           counters.overruns += lanes - tally.dead;
           break;
         }
-        medium.extinction(BasicPoints<T>{state.x.data(), state.y.data(), state.z.data(), lanes}, state.extinction.data());
-        for (std::size_t k = 0; k < lanes; k += N) go_on(k, step, tally);
+        const auto& [x, y, z] = state.points;
+        medium.extinction(BasicPoints<T>{x.data(), y.data(), z.data(), lanes}, state.extinction.data());
+        if (course.has_several())
+          for (std::size_t k = 0; k < lanes; k += N) go_on<true>(k, step, tally);
+        else
+          for (std::size_t k = 0; k < lanes; k += N) go_on<false>(k, step, tally);
         // Moving walks costs more than idle lanes do, until a quarter of them idles.
         if (4 * tally.dead >= lanes) lanes = close_ranks(lanes, tally);
       }
@@ -155,7 +168,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       Walks walks;
       walks.stream = Streams::seeded({first.key, first.ray, first.sample + k});
       walks.sample = Index::counting_from(static_cast<typename Index::Number>(k));
-      Flight flight(course, walks.place);
+      LaneFlight<T, N> flight(course, walks.place);
       Streams rng(walks.stream, there);
       flight.start(state.ray.majorant);
       kernel.estimator_.init(walks.walk, state.ray, flight, rng);
@@ -164,26 +177,28 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       tally.dead += N - count(there);
     }
 
+    template <bool several>
     [[gnu::always_inline]] void go_on(std::size_t k, std::uint32_t step, Tally& tally) {
       const Mask alive = Mask::load(&state.alive[k / N * kMaskBytes]);
       Walks walks;
       walks.place.piece = Index(0);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
-        if (n == kPiece && !course.has_several()) return;
+        if (n == kPiece && !several) return;
         using Number = std::remove_reference_t<decltype(lanes)>;
         lanes = Number(hn::BitCast(hn::DFromV<decltype(raw(lanes))>(), Pack::load(&state.numbers[n][k]).vector()));
       });
-      Flight flight(course, walks.place);
+      LaneFlight<T, N, several> flight(course, walks.place);
       Streams rng(walks.stream, alive);
       const Pack extinction = Pack::load(&state.extinction[k]);
-      audit(flight, extinction, alive, tally);
+      audit<several>(flight.piece(), extinction, alive, tally);
       kernel.estimator_.consume(walks.walk, state.ray, flight, extinction, rng);
       propose(k, walks, alive, flight, rng, step, tally);
     }
 
     /// The walks' next points; those that have none leave their result.
-    [[gnu::always_inline]] void propose(std::size_t k, Walks& walks, Mask alive, Flight& flight, Streams& rng, std::uint32_t step,
-                                        Tally& tally) {
+    template <bool several>
+    [[gnu::always_inline]] void propose(std::size_t k, Walks& walks, Mask alive, LaneFlight<T, N, several>& flight, Streams& rng,
+                                        std::uint32_t step, Tally& tally) {
       const Mask goes_on = alive & kernel.estimator_.propose(walks.walk, state.ray, flight, rng), ends = alive & !goes_on;
       tally.draws += rng.draws();
       tally.dead += count(ends);
@@ -193,13 +208,12 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       Index(static_cast<typename Index::Number>(step)).store(&state.steps[k], ends);
       goes_on.store(&state.alive[k / N * kMaskBytes]);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
-        if (n == kPiece && !course.has_several()) return;
+        if (n == kPiece && !several) return;
         Pack(hn::BitCast(typename Pack::Tag(), raw(lanes))).store(&state.numbers[n][k]);
       });
       const Pack t = walks.place.position;
-      (Pack(origin[0]) + t * Pack(direction[0])).store(&state.x[k]);
-      (Pack(origin[1]) + t * Pack(direction[1])).store(&state.y[k]);
-      (Pack(origin[2]) + t * Pack(direction[2])).store(&state.z[k]);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (moves_along(axis)) (Pack(origin[axis]) + t * Pack(direction[axis])).store(&state.points[axis][k]);
     }
 
     Pack answer(const Walks& walks) const {
@@ -208,11 +222,13 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       return kernel.estimator_.result(walks.walk, state.ray);
     }
 
-    [[gnu::always_inline]] void audit(const Flight& at, Pack extinction, Mask alive, Tally& tally) {
+    template <bool several>
+    [[gnu::always_inline]] void audit(Index piece, Pack extinction, Mask alive, Tally& tally) {
       if constexpr (requires { E::kIgnoresMajorant; }) return;
-      const Pack bound = majorant.rate(at.piece());
-      const Mask beyond = alive & (extinction > bound * Pack(1 + kBoundRounding<T>));
+      const Pack bound = majorant.template rate<several>(piece);
+      Mask beyond = extinction > bound * Pack(1 + kBoundRounding<T>);
       if (none(beyond)) return;
+      beyond = beyond & alive;
       tally.violations += count(beyond);
       const Pack excess = select(beyond, extinction / bound, Pack(0));
       T x[N];
@@ -222,33 +238,35 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
 
     /// Hands out what the dead have left and moves the living together; tells how many lanes they take.
     [[gnu::noinline]] std::size_t close_ranks(std::size_t lanes, Tally& tally) {
-      std::size_t kept = 0;
+      std::size_t kept = 0, left = 0;
       for (std::size_t k = 0; k < lanes; k += N) {
         const Mask alive = Mask::load(&state.alive[k / N * kMaskBytes]);
         const Mask there = Mask::first(k < tally.walks ? std::min(N, tally.walks - k) : 0), dead = there & !alive;
+        const auto close = [k](const ClosedRanks<T, N>& ranks, const auto& from, auto& to, std::size_t at) {
+          Pack(ranks(Pack::load(reinterpret_cast<const T*>(&from[k])).vector())).store(reinterpret_cast<T*>(&to[at]));
+        };
         const ClosedRanks<T, N> close_dead(dead), close_living(alive);
-        T result[N];
-        typename Index::Number sample[N], steps[N];
-        Pack(close_dead(Pack::load(&state.result[k]).vector())).store(result);
-        Index(close_dead(Index::load(&state.steps[k]).vector())).store(steps);
-        Index(close_dead(Index::load(reinterpret_cast<const typename Index::Number*>(&state.numbers[kSample][k])).vector()))
-            .store(sample);
-        for (std::size_t i = 0; i < count(dead); ++i) {
-          values[sample[i]] = result[i];
-          lookups[sample[i]] = static_cast<std::uint32_t>(steps[i]);
-          tally.lookups += lookups[sample[i]];
-        }
-        for (auto& number : state.numbers) Pack(close_living(Pack::load(&number[k]).vector())).store(&number[kept]);
-        Pack(close_living(Pack::load(&state.x[k]).vector())).store(&state.x[kept]);
-        Pack(close_living(Pack::load(&state.y[k]).vector())).store(&state.y[kept]);
-        Pack(close_living(Pack::load(&state.z[k]).vector())).store(&state.z[kept]);
+        close(close_dead, state.result, state.left_result, left);
+        close(close_dead, state.steps, state.left_steps, left);
+        close(close_dead, state.numbers[kSample], state.left_sample, left);
+        left += count(dead);
+        for (std::size_t n = 0; n < kNumbers; ++n)
+          if (n != kPiece || course.has_several()) close(close_living, state.numbers[n], state.numbers[n], kept);
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          if (moves_along(axis)) close(close_living, state.points[axis], state.points[axis], kept);
         kept += count(alive);
       }
-      const std::size_t left = (kept + N - 1) / N * N;
-      for (std::size_t k = 0; k < left; k += N) Mask::first(std::min(N, kept - k)).store(&state.alive[k / N * kMaskBytes]);
-      tally.dead = left - kept;
+      for (std::size_t i = 0; i < left; ++i) {
+        const auto sample = static_cast<std::size_t>(state.left_sample[i]);
+        values[sample] = state.left_result[i];
+        lookups[sample] = static_cast<std::uint32_t>(state.left_steps[i]);
+        tally.lookups += lookups[sample];
+      }
+      lanes = (kept + N - 1) / N * N;
+      for (std::size_t k = 0; k < lanes; k += N) Mask::first(std::min(N, kept - k)).store(&state.alive[k / N * kMaskBytes]);
+      tally.dead = lanes - kept;
       tally.walks = kept;
-      return left;
+      return lanes;
     }
 
     static auto raw(const auto& lanes) {

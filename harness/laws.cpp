@@ -229,11 +229,12 @@ class LawTester {
         if (list.size() < kFewest) continue;
         const std::span<const Real> y(list.data() + 1, list.size() - 1);
         // The rate that is best at a fixed number of samples and levels from 1e-2 to 1e-12.
-        for (const Real q : {3., 7.})
-          for (const int side : {-1, 1}) {
-            const Bet bet{Bet::Kind::catoni, side, 0, 1.02 * list[0], {q / std::sqrt(static_cast<Real>(y.size()) * list[0])}};
-            logs.push_back(bet_on(bet, y, 1)[0] - log_denominator(bet, bet.rates[0], y.size(), 1));
-          }
+        const Real rate = 1 / std::sqrt(static_cast<Real>(y.size()) * list[0]);
+        for (const int side : {-1, 1}) {
+          const Bet bet{Bet::Kind::catoni, side, 0, 1.02 * list[0], {3 * rate, 7 * rate}};
+          const std::vector<Real> won = bet_on(bet, y, 1);
+          for (std::size_t r = 0; r < won.size(); ++r) logs.push_back(won[r] - log_denominator(bet, bet.rates[r], y.size(), 1));
+        }
       }
     return log_mean_exp(logs);
   }
@@ -317,12 +318,14 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
   own.samples_per_ray = samples;
   own.gate = {};
   const CellGate gate = plan_gate(own, pieces, targets, range, Claim::unbiased, all[0], std::nullopt, {});
-  const auto sampled = sample_cell(own, pieces, kernel, targets, {kFirstSample, samples}, &gate, stop, [](double) {});
+  const auto sampled =
+      sample_cell(own, pieces, kernel, targets, {.first = kFirstSample, .per_ray = samples, .only_evidence = true}, &gate, stop,
+                  [](double) {});
   if (!sampled) return std::nullopt;
   std::vector<Real> logs;
   for (std::size_t i = 0; i < gate.tests.size(); ++i) {
     if (gate.tests[i].channel == MeanTest::kLookups) continue;
-    const TestRecord record = test_record(gate.tests[i], sampled->evidence[i], gate.errors_per_sum);
+    const TestRecord record = test_record(gate.tests[i], sampled->evidence[i]);
     if (gate.tests[i].deterministic)
       logs.push_back(record.largest_error > record.rounding + record.reference_error ? kCertain : 0);
     else

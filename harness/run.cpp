@@ -374,16 +374,15 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
   for (;;) {
     verdict.violated = prepared.needs_bound && violations > 0;
     verdict.tests.clear();
-    for (std::size_t i = 0; i < gate.tests.size(); ++i)
-      verdict.tests.push_back(test_record(
-          gate.tests[i], evidence[i], gate.tests[i].channel == MeanTest::kLookups ? gate.lookups_per_sum : gate.errors_per_sum));
+    for (std::size_t i = 0; i < gate.tests.size(); ++i) verdict.tests.push_back(test_record(gate.tests[i], evidence[i]));
     decide(verdict, prepared.targets.names);
     const Outcome mean = gate.against == "own mean" ? verdict.own_mean : verdict.unbiased;
     const bool open = mean == Outcome::inconclusive || (mean == Outcome::pass && verdict.lookups == Outcome::inconclusive);
     if (!open || verdict.samples_per_ray >= most) return verdict;
     constexpr std::uint64_t kRound = 64;
     const std::uint64_t left = (most - verdict.samples_per_ray + kRound - 1) / kRound * kRound;
-    const SampleSpan span{verdict.samples_per_ray, std::min(verdict.samples_per_ray, left)};
+    const SampleSpan span{
+        .first = verdict.samples_per_ray, .per_ray = std::min(verdict.samples_per_ray, left), .only_evidence = true};
     const auto more =
         sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, span, &gate, stop, progress);
     if (!more) return std::nullopt;

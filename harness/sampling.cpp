@@ -80,22 +80,24 @@ class Evidences {
 
   void add_errors(std::size_t ray, std::size_t channel, std::span<const Real> errors) {
     if (!gate_ || !pooled_[channel]) return;
-    sum(errors, gate_->errors_per_sum);
     const auto largest = [&] {
       Real most = 0;
       for (const Real error : errors) most = std::max(most, std::abs(error));
       return most;
     };
-    feed(*pooled_[channel], largest);
-    if (!grouped_[channel].empty()) feed(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])], largest);
+    const auto add_to = [&](std::size_t test) {
+      const int together = gate_->tests[test].errors_per_sum;
+      feed(test, together == 1 ? errors : sum(errors, together, 0), largest);
+    };
+    add_to(*pooled_[channel]);
+    if (!grouped_[channel].empty()) add_to(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])]);
   }
 
   void add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups) {
     if (!gate_ || !lookups_ || lookups.empty()) return;
-    sum(lookups, gate_->lookups_per_sum);
+    const int together = gate_->tests[*lookups_].errors_per_sum;
     const Real expected = gate_->lookups[ray];
-    for (Real& sum : sums_) sum -= expected * gate_->lookups_per_sum;
-    feed(*lookups_, [&] {
+    feed(*lookups_, sum(lookups, together, expected * together), [&] {
       const auto [least, most] = std::minmax_element(lookups.begin(), lookups.end());
       return std::max(expected - *least, *most - expected);
     });
@@ -108,40 +110,52 @@ class Evidences {
  private:
   static constexpr std::size_t kTogether = 8192, kEnough = 2048;
 
-  /// Which errors share a sum is free; a stride lets all sums advance together.
+  /// Sums of so many numbers each, less what is expected of one.  Which numbers share a sum is free; a stride lets a register of
+  /// sums advance together.
   template <class Number>
-  void sum(std::span<const Number> errors, int together) {
-    const std::size_t count = errors.size() / static_cast<std::size_t>(together);
-    sums_.assign(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(count));
-    for (std::size_t k = 1; k < static_cast<std::size_t>(together); ++k)
-      for (std::size_t j = 0; j < count; ++j) sums_[j] += static_cast<Real>(errors[k * count + j]);
+  std::span<const Real> sum(std::span<const Number> numbers, int together, Real expected) {
+    const std::size_t count = numbers.size() / static_cast<std::size_t>(together);
+    sums_.resize(count);
+    constexpr std::size_t kSideBySide = 64;
+    std::array<Real, kSideBySide> run;
+    for (std::size_t j = 0; j < count; j += kSideBySide) {
+      const std::size_t width = std::min(kSideBySide, count - j);
+      const auto add = [&](std::size_t n) {
+        const Number* from = &numbers[j];
+        for (std::size_t i = 0; i < n; ++i) run[i] = static_cast<Real>(from[i]);
+        for (int k = 1; k < together; ++k) {
+          from += count;
+          for (std::size_t i = 0; i < n; ++i) run[i] += static_cast<Real>(from[i]);
+        }
+        for (std::size_t i = 0; i < n; ++i) sums_[j + i] = run[i] - expected;
+      };
+      // A width that the compiler knows stays in registers.
+      width == kSideBySide ? add(kSideBySide) : add(width);
+    }
+    return sums_;
   }
 
   template <class Largest>
-  void feed(std::size_t test, Largest largest_error) {
+  void feed(std::size_t test, std::span<const Real> sums, Largest largest_error) {
     Evidence& evidence = out_[test];
     if (gate_->tests[test].deterministic) {
       evidence.largest_error = std::max(evidence.largest_error, largest_error());
-      evidence.sums += sums_.size();
+      evidence.sums += sums.size();
       return;
     }
     std::vector<Real>& waiting = pending_[test];
-    if (waiting.empty() && sums_.size() >= kEnough) {
-      evidence.add(gate_->tests[test], sums_, sum_length(test));
+    if (waiting.empty() && sums.size() >= kEnough) {
+      evidence.add(gate_->tests[test], sums);
       return;
     }
-    waiting.insert(waiting.end(), sums_.begin(), sums_.end());
+    waiting.insert(waiting.end(), sums.begin(), sums.end());
     if (waiting.size() >= kTogether) flush(test);
   }
 
   void flush(std::size_t test) {
     if (pending_[test].empty()) return;
-    out_[test].add(gate_->tests[test], pending_[test], sum_length(test));
+    out_[test].add(gate_->tests[test], pending_[test]);
     pending_[test].clear();
-  }
-
-  int sum_length(std::size_t test) const {
-    return gate_->tests[test].channel == MeanTest::kLookups ? gate_->lookups_per_sum : gate_->errors_per_sum;
   }
 
   const CellGate* gate_;
@@ -333,10 +347,11 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
           const Real target = targets.mean[ray * outputs + o];
           const std::span<Real> errors(&mine.errors[o * batch], batch);
           const std::span<const Real> counted = take_errors(mine, o, target, errors, out);
+          if (span.only_evidence) continue;
           out.blocks[o].add(ray, counted, out.moments[local * outputs + o]);
           out.groups[o].add(counted);
         }
-        out.lookups_squared[local] += sum_of_squares(mine.block.lookups);
+        if (!span.only_evidence) out.lookups_squared[local] += sum_of_squares(mine.block.lookups);
         const auto counted_at = Clock::now();
         for (std::size_t o = 0; o < outputs && gate; ++o) {
           const std::span<Real> errors(&mine.errors[o * batch], batch);
@@ -380,7 +395,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     for (std::size_t o = 0; o < outputs; ++o) {
       result.groups[o] += part.groups[o];
       result.blocks[o] += part.blocks[o];
-      if (span.per_ray <= whole_chunk) continue;
+      if (span.per_ray <= whole_chunk || span.only_evidence) continue;
       if (chunk.first == 0) across[o].finish_ray();
       if (chunk.count == whole_chunk) across[o].carry(static_cast<std::size_t>(level), part.group_sums[o]);
     }
@@ -393,7 +408,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     result.working_seconds += std::chrono::duration<double>(part.working).count();
     for (const auto& [test, evidence] : part.evidence) result.evidence[test] += evidence;
   }
-  if (span.per_ray > whole_chunk) {
+  if (span.per_ray > whole_chunk && !span.only_evidence) {
     // A chunk's own groups already hold the level at which the chunks begin.
     for (std::size_t o = 0; o < outputs; ++o) result.groups[o].append_above(static_cast<std::size_t>(level), across[o]);
   }

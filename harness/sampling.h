@@ -30,7 +30,8 @@ struct Sampled {
 /// Which of a cell's samples: first .. first + per_ray - 1 of every ray.
 struct SampleSpan {
   std::uint64_t first = 0, per_ray = 0;
-  bool about_zero = false;  ///< moments of the samples themselves instead of their errors
+  bool about_zero = false;     ///< moments of the samples themselves instead of their errors
+  bool only_evidence = false;  ///< moments, groups, blocks and squares of lookups stay empty
 };
 
 /// clamp, then quantise, as configured.
@@ -53,7 +54,7 @@ struct CellTheory {
   bool unit_weights = false;    ///< of a free path: its weight is always 1
   /// Per ray and output; empty where not known for all.  Variance of a sample; the estimator's own mean minus the target.
   std::vector<Real> ray_variance, ray_shift;
-  bool infinite_variance = false;  ///< stated of some ray: no sample variance is to be trusted
+  bool infinite_variance = false;                       ///< stated of some ray: no sample variance is to be trusted
   std::vector<Real> ray_lookups, ray_lookups_variance;  ///< per ray; empty where not known for all
 };
 

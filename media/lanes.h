@@ -3,6 +3,7 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -67,8 +68,9 @@ class Lanes {
       return hn::Exp(Tag(), a.vector_);
     }
   }
-  /// -log, at most 4 ulp off; 0 at 1.
-  friend Lanes negative_logarithm(Lanes a) { return -Lanes(hn::Log(Tag(), a.vector_)); }
+  /// At most 4 ulp off; 0 at 1.
+  friend Lanes logarithm(Lanes a) { return hn::Log(Tag(), a.vector_); }
+  friend Lanes negative_logarithm(Lanes a) { return -logarithm(a); }
   /// 1 - e^a, at most 4 ulp off.
   friend Lanes one_minus_exponential(Lanes a) { return -Lanes(hn::Expm1(Tag(), a.vector_)); }
   /// At most 3 ulp off, for magnitudes below 39000.
@@ -239,16 +241,22 @@ class ClosedRanks {
 /// out[i] = f(x[i]), f taking Lanes and giving Lanes; x and out may be the same.
 template <class T, class Function>
 void map_lanes(const T* x, std::size_t n, T* out, const Function& f) {
-  constexpr std::size_t kWidth = kNativeLanes<T>;
+  constexpr std::size_t kWidth = kNativeLanes<T>, kMost = 16 * kWidth;
   using Pack = Lanes<T, kWidth>;
-  std::size_t i = 0;
-  for (; i + kWidth <= n; i += kWidth) f(Pack::load(x + i)).store(out + i);
-  if (i == n) return;
-  // The rest, filled up with its first number, which f takes as well.
-  T rest[kWidth];
-  for (std::size_t k = 0; k < kWidth; ++k) rest[k] = x[i + k < n ? i + k : i];
-  f(Pack::load(rest)).store(rest);
-  for (std::size_t k = 0; i + k < n; ++k) out[i + k] = rest[k];
+  // Results go to memory of this call first: what f refers to cannot change meanwhile, so the compiler keeps it in registers.
+  alignas(HWY_MAX_BYTES) T results[kMost];
+  for (std::size_t done = 0; done < n; done += kMost) {
+    const std::size_t left = std::min(kMost, n - done), whole = left / kWidth * kWidth;
+    for (std::size_t i = 0; i < whole; i += kWidth) f(Pack::load(x + done + i)).store(results + i);
+    if (whole < left) {
+      // The rest, filled up with its first number, which f takes as well.
+      T rest[kWidth];
+      for (std::size_t k = 0; k < kWidth; ++k) rest[k] = x[done + whole + (whole + k < left ? k : 0)];
+      f(Pack::load(rest)).store(results + whole);
+    }
+    for (std::size_t i = 0; i < whole; i += kWidth) Pack::load(results + i).store(out + done + i);
+    for (std::size_t i = whole; i < left; ++i) out[done + i] = results[i];
+  }
 }
 
 }  // namespace nullmark
