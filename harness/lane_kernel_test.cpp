@@ -76,25 +76,26 @@ std::vector<Case> cases() {
   ExponentialCube cube;
   const Ray slanted{{0.02, 0.1, 0.3}, Vec3(1, 0.5, 0.25).normalized(), 0, kInfinity};
   std::vector<Case> all;
-  const auto add = [&](const std::string& name, std::shared_ptr<const Medium> medium) {
+  const auto add = [&](const std::string& name, std::shared_ptr<const Medium> medium, const Ray& world) {
     const auto with = [&](const std::string& majorant, std::shared_ptr<const MajorantStructure> structure) {
-      all.push_back({name + "/" + majorant, medium, std::move(structure), slanted});
+      all.push_back({name + "/" + majorant, medium, std::move(structure), world});
     };
     with("global", std::make_shared<GlobalMajorant>(*medium, 1.5));
     with("violated", std::make_shared<GlobalMajorant>(*medium, 0.7));
     with("grid", std::make_shared<GridMajorant>(*medium, std::array{7, 3, 5}, 1));
     with("rewind", std::make_shared<GridMajorant>(*medium, std::array{7, 3, 5}, 1.2, Crossing::rewind));
   };
-  add("constant", constant(3));
-  add("bump", built(bump));
-  add("hole", built(hole));
-  add("cosine", built(cosine));
-  add("cube", [&] {
-    ExponentialCube inner = cube;
-    inner.profile.x0 = 0.01;
-    return built(inner);
-  }());
-  add("volume", volume());
+  cube.profile.x0 = 0.01;
+  add("constant", constant(3), slanted);
+  add("bump", built(bump), slanted);
+  add("hole", built(hole), slanted);
+  add("cosine", built(cosine), slanted);
+  add("cube", built(cube), slanted);
+  add("volume", volume(), slanted);
+  // Along an axis two coordinates of a walk's points stay as they are.
+  add("volume along x", volume(), {{-1, 0.4, 0.6}, {1, 0, 0}, 0, kInfinity});
+  add("volume along -y", volume(), {{0.4, 2, 0.6}, {0, -1, 0}, 0, kInfinity});
+  add("volume along z", volume(), {{0.6, 0.4, -1}, {0, 0, 1}, 0, kInfinity});
   return all;
 }
 
