@@ -80,9 +80,14 @@ struct AlongAxis {
   template <class T>
   void extinction(const BasicPoints<T>& points, T* out) const {
     const T* x = axis == 0 ? points.x : axis == 1 ? points.y : points.z;
-    if constexpr (requires(Lanes<T, 1> s) { profile.value(s); })
-      map_lanes(x, points.size, out, [this](auto lanes) { return scale * profile.value(coordinate(lanes)); });
-    else
+    if constexpr (requires(Lanes<T, 1> s) { profile.value(s); }) {
+      const auto value = [this](auto lanes) { return scale * profile.value(coordinate(lanes)); };
+      // Paths look up one point after the other.
+      if (points.size == 1)
+        value(Lanes<T, 1>::load(x)).store(out);
+      else
+        map_lanes(x, points.size, out, value);
+    } else
       for (std::size_t i = 0; i < points.size; ++i) out[i] = static_cast<T>(scale * profile.value(coordinate(Real{x[i]})));
   }
 
