@@ -56,6 +56,15 @@ TEST(Evidence, IsTheProductOverSingleErrors) {
     }
 }
 
+/// The same factor thousands of times, on both sides of what is multiplied without a second look.
+TEST(Evidence, LargeAndSmallFactorsNeitherOverflowNorVanish) {
+  for (const Real f : {1e-4, 1 / 17., 1 / 15.5, 15.5, 17., 1e5})
+    for (const int side : {-1, 1})
+      expect_plain({Bet::Kind::betting, side, 0, 0, {1, 1}}, std::vector<Real>(5000, side * (f - 1)));
+  for (const Real y : {-300., -5., -4.2, 4.2, 5., 300.})
+    for (const int side : {-1, 1}) expect_plain({Bet::Kind::catoni, side, 0, 1, {1, 0.9}}, std::vector<Real>(5000, y));
+}
+
 TEST(Evidence, OfSumsIsTheProductOverSums) {
   const std::vector<Real> errors = uniforms(6400, -1, 1);
   for (const int together : {2, 16, 64}) {
@@ -146,12 +155,19 @@ TEST(Evidence, HugeErrorsAreFinite) {
   // One that is none of the numbers among tame ones.
   for (const Real odd : {std::numeric_limits<Real>::quiet_NaN(), kInfinity, -kInfinity})
     for (const std::size_t at : {0u, 70u, 4095u, 4100u})
-      for (const int side : {-1, 1}) {
-        std::vector<Real> sums = uniforms(4101, -1, 1);
-        sums[at] = odd;
-        for (const Bet::Kind kind : {Bet::Kind::betting, Bet::Kind::catoni})
-          for (const Real log : bet_on({kind, side, 0, 1, {1e-3, 0.3}}, sums, 1)) EXPECT_TRUE(std::isfinite(log)) << odd;
-      }
+      for (const int side : {-1, 1})
+        for (const Bet::Kind kind : {Bet::Kind::betting, Bet::Kind::catoni}) {
+          const Bet bet{kind, side, 0, 1, {1e-3, 0.3}};
+          std::vector<Real> sums = uniforms(4101, -1, 1);
+          sums[at] = 0;
+          const std::vector<Real> without = bet_on(bet, sums, 1);
+          sums[at] = odd;
+          const std::vector<Real> with = bet_on(bet, sums, 1);
+          for (std::size_t i = 0; i < with.size(); ++i) {
+            EXPECT_TRUE(std::isfinite(with[i])) << odd;
+            EXPECT_LE(with[i], without[i] + 30 * std::log(2.) + 1e-9) << odd;
+          }
+        }
   // The cap lowers wealth: what a single error wins is bounded, what it loses is not forgotten.
   const Bet down{Bet::Kind::betting, -1, 0, 0, {0.25}};
   const std::vector<Real> ruin(3000, 4 - 1e-12);
