@@ -57,11 +57,15 @@ constexpr std::size_t kBlock = 2048;
 constexpr std::size_t kChains = 2;  // of factors, that do not wait for each other
 using Chains = std::array<Eight, kChains>;
 
-/// Factors of any size.  More than kMostWon is not won at once; kTogether of them have a finite product.
+/// Factors of any size.  More than kMostWon is not won at once, and less than nothing is nothing, or two of them would win back
+/// what is lost; kTogether of them have a finite product.
 struct Wild {
   static constexpr Real kMostWon = 0x1p30;
   static constexpr std::size_t kTogether = 32;
-  static Eight won(const Eight& f) { return f < kMostWon ? f : Eight{} + kMostWon; }
+  static Eight won(const Eight& f) {
+    const Eight capped = f < kMostWon ? f : Eight{} + kMostWon;
+    return f < 0 ? Eight{} : capped;
+  }
   static void take(const Chains& factors, Products& products, int sign) {
     // A wealth that is lost for good; what this adds to its expectation is nothing.
     const Eight least = Eight{} + 1e-300, most = Eight{} + 1e300;

@@ -168,6 +168,13 @@ TEST(Evidence, HugeErrorsAreFinite) {
             EXPECT_LE(with[i], without[i] + 30 * std::log(2.) + 1e-9) << odd;
           }
         }
+  // Ruined twice in one lane, not made rich by it.
+  for (const Real ruin : {-3., -1e300, -kInfinity})
+    for (const std::size_t apart : {8u, 16u, 32u, 256u}) {
+      std::vector<Real> sums(600, 0);
+      sums[1] = sums[1 + apart] = ruin;
+      EXPECT_LT(bet_on({Bet::Kind::betting, 1, 0, 0, {0.5}}, sums, 1)[0], -600) << ruin << ", " << apart;
+    }
   // The cap lowers wealth: what a single error wins is bounded, what it loses is not forgotten.
   const Bet down{Bet::Kind::betting, -1, 0, 0, {0.25}};
   const std::vector<Real> ruin(3000, 4 - 1e-12);

@@ -255,7 +255,7 @@ class Trial {
   /// Of so many consecutive errors each.
   const std::vector<Real>& sums(std::size_t together) {
     sums_.assign(errors_.size() / together, 0);
-    for (std::size_t i = 0; i < errors_.size(); ++i) sums_[i / together] += errors_[i];
+    for (std::size_t i = 0; i < sums_.size() * together; ++i) sums_[i / together] += errors_[i];
     return sums_;
   }
 

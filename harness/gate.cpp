@@ -194,13 +194,13 @@ std::vector<int> ray_groups(const BuiltRays& rays) {
   return groups;
 }
 
-void Evidence::add(const MeanTest& test, std::span<const Real> errors) {
+void Evidence::add(const MeanTest& test, std::span<const Real> summed) {
   std::vector<const Bet*> bets;
   for (const auto& placed : test.bets) bets.push_back(&placed.second);
-  const std::vector<Real> added = bet_on(bets, errors, test.errors_per_sum);
+  const std::vector<Real> added = bet_on(bets, summed, test.errors_per_sum);
   logs.resize(std::max(logs.size(), added.size()), 0);
   for (std::size_t i = 0; i < added.size(); ++i) logs[i] += added[i];
-  sums += errors.size();
+  sums += summed.size();
 }
 
 Evidence& Evidence::operator+=(const Evidence& other) {

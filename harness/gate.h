@@ -69,7 +69,7 @@ struct Evidence {
   Real largest_error = 0;
 
   /// Sums of as many errors each as the test asks for.
-  void add(const MeanTest& test, std::span<const Real> errors);
+  void add(const MeanTest& test, std::span<const Real> summed);
   Evidence& operator+=(const Evidence& other);
 };
 

@@ -31,7 +31,7 @@ struct Sampled {
 struct SampleSpan {
   std::uint64_t first = 0, per_ray = 0;
   bool about_zero = false;     ///< moments of the samples themselves instead of their errors
-  bool only_evidence = false;  ///< moments, groups, blocks and squares of lookups stay empty
+  bool only_evidence = false;  ///< moments, groups, blocks and squares of lookups hold nothing
 };
 
 /// clamp, then quantise, as configured.
