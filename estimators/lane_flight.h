@@ -53,7 +53,8 @@ struct LanePlace {
 };
 
 /// Flight for N walks of one ray side by side: the same steps in the same order for every lane.  Without `several` the course has
-/// one piece, as with one bound for the whole ray, and nothing is asked about others.
+/// one piece, as with one bound for the whole ray, and nothing is asked about others; an estimator that sets out on another
+/// course than the ray's does so in its init, which runs with `several`.
 template <class T, std::size_t N, bool several = true>
 class LaneFlight {
  public:
@@ -66,7 +67,7 @@ class LaneFlight {
 
   LaneFlight(Course& course, Place& at) : course_(course), at_(at) {}
 
-  void start(const Rates& rates) {
+  void start(const Rates& rates) requires several {
     course_ = Course(rates);
     at_ = {Pack(0), Pack(course_.begin_), Index(0)};
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstddef>
 
 #include "estimators/lane_flight.h"
@@ -72,12 +74,10 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock>, kNumbers> numbers{};
     alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock>, 3> points{};  ///< [axis][walk]
     alignas(HWY_MAX_BYTES) std::array<T, kBlock> extinction{};
-    alignas(HWY_MAX_BYTES) std::array<T, kBlock> result{};  ///< of walks that have ended, and their lookups
-    alignas(HWY_MAX_BYTES) std::array<typename Index::Number, kBlock> steps{};
+    alignas(HWY_MAX_BYTES) std::array<T, kBlock> result{}, steps{};  ///< of walks that have ended; steps are the bits of an Index
     std::array<std::uint8_t, kBlock / N * kMaskBytes> alive{};
     /// What ranks leave behind when they close; whole registers are written at the end.
-    alignas(HWY_MAX_BYTES) std::array<T, kBlock + N> left_result{};
-    alignas(HWY_MAX_BYTES) std::array<typename Index::Number, kBlock + N> left_sample{}, left_steps{};
+    alignas(HWY_MAX_BYTES) std::array<T, kBlock + N> left_result{}, left_sample{}, left_steps{};
   };
 
  public:
@@ -137,10 +137,10 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     bool moves_along(std::size_t axis) const { return direction[axis] != 0; }
 
     void block(std::size_t count) {
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        if (!moves_along(axis)) state.points[axis].fill(origin[axis]);
       Tally tally{.walks = count};
       std::size_t lanes = (count + N - 1) / N * N;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (!moves_along(axis)) std::fill_n(state.points[axis].begin(), lanes, origin[axis]);
       for (std::size_t k = 0; k < lanes; k += N) set_out(k, Mask::first(std::min(N, count - k)), tally);
       lanes = close_ranks(lanes, tally);
       for (std::uint32_t step = 1; lanes > 0; ++step) {
@@ -172,7 +172,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       Streams rng(walks.stream, there);
       flight.start(state.ray.majorant);
       kernel.estimator_.init(walks.walk, state.ray, flight, rng);
-      walks.sample.store(reinterpret_cast<typename Index::Number*>(&state.numbers[kSample][k]));
+      bits(walks.sample).store(&state.numbers[kSample][k]);
       propose(k, walks, there, flight, rng, 0, tally);
       tally.dead += N - count(there);
     }
@@ -205,11 +205,11 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       if constexpr (requires { kernel.estimator_.real_collisions(walks.walk, state.ray); })
         tally.real += count(ends & kernel.estimator_.real_collisions(walks.walk, state.ray));
       answer(walks).store(&state.result[k], ends);
-      Index(static_cast<typename Index::Number>(step)).store(&state.steps[k], ends);
+      bits(Index(static_cast<typename Index::Number>(step))).store(&state.steps[k], ends);
       goes_on.store(&state.alive[k / N * kMaskBytes]);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
         if (n == kPiece && !several) return;
-        Pack(hn::BitCast(typename Pack::Tag(), raw(lanes))).store(&state.numbers[n][k]);
+        bits(lanes).store(&state.numbers[n][k]);
       });
       const Pack t = walks.place.position;
       for (std::size_t axis = 0; axis < 3; ++axis)
@@ -243,7 +243,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
         const Mask alive = Mask::load(&state.alive[k / N * kMaskBytes]);
         const Mask there = Mask::first(k < tally.walks ? std::min(N, tally.walks - k) : 0), dead = there & !alive;
         const auto close = [k](const ClosedRanks<T, N>& ranks, const auto& from, auto& to, std::size_t at) {
-          Pack(ranks(Pack::load(reinterpret_cast<const T*>(&from[k])).vector())).store(reinterpret_cast<T*>(&to[at]));
+          Pack(ranks(Pack::load(&from[k]).vector())).store(&to[at]);
         };
         const ClosedRanks<T, N> close_dead(dead), close_living(alive);
         close(close_dead, state.result, state.left_result, left);
@@ -257,9 +257,9 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
         kept += count(alive);
       }
       for (std::size_t i = 0; i < left; ++i) {
-        const auto sample = static_cast<std::size_t>(state.left_sample[i]);
+        const auto sample = static_cast<std::size_t>(std::bit_cast<typename Index::Number>(state.left_sample[i]));
         values[sample] = state.left_result[i];
-        lookups[sample] = static_cast<std::uint32_t>(state.left_steps[i]);
+        lookups[sample] = static_cast<std::uint32_t>(std::bit_cast<typename Index::Number>(state.left_steps[i]));
         tally.lookups += lookups[sample];
       }
       lanes = (kept + N - 1) / N * N;
@@ -275,6 +275,9 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       else
         return lanes;
     }
+
+    /// Any register, as it is kept among the numbers.
+    static Pack bits(const auto& lanes) { return hn::BitCast(typename Pack::Tag(), raw(lanes)); }
   };
 
   E estimator_;

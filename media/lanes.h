@@ -241,9 +241,10 @@ class ClosedRanks {
 /// out[i] = f(x[i]), f taking Lanes and giving Lanes; x and out may be the same.
 template <class T, class Function>
 void map_lanes(const T* x, std::size_t n, T* out, const Function& f) {
-  constexpr std::size_t kWidth = kNativeLanes<T>, kMost = 16 * kWidth;
+  constexpr std::size_t kWidth = kNativeLanes<T>, kMost = (std::is_empty_v<Function> ? 1 : 16) * kWidth;
   using Pack = Lanes<T, kWidth>;
-  // Results go to memory of this call first: what f refers to cannot change meanwhile, so the compiler keeps it in registers.
+  // Results go to memory of this call first: what f refers to, if anything, cannot change meanwhile, so that the compiler keeps
+  // it in registers.
   alignas(HWY_MAX_BYTES) T results[kMost];
   for (std::size_t done = 0; done < n; done += kMost) {
     const std::size_t left = std::min(kMost, n - done), whole = left / kWidth * kWidth;
