@@ -241,21 +241,23 @@ class ClosedRanks {
 /// out[i] = f(x[i]), f taking Lanes and giving Lanes; x and out may be the same.
 template <class T, class Function>
 void map_lanes(const T* x, std::size_t n, T* out, const Function& f) {
-  constexpr std::size_t kWidth = kNativeLanes<T>, kMost = (std::is_empty_v<Function> ? 1 : 16) * kWidth;
+  constexpr std::size_t kWidth = kNativeLanes<T>, kMost = 16 * kWidth;
   using Pack = Lanes<T, kWidth>;
-  // Results go to memory of this call first: what f refers to, if anything, cannot change meanwhile, so that the compiler keeps
-  // it in registers.
+  // What f refers to could change as results are written, so they go to memory of this call first: the compiler then keeps it in
+  // registers.
+  constexpr bool kDirect = std::is_empty_v<Function>;
   alignas(HWY_MAX_BYTES) T results[kMost];
   for (std::size_t done = 0; done < n; done += kMost) {
     const std::size_t left = std::min(kMost, n - done), whole = left / kWidth * kWidth;
-    for (std::size_t i = 0; i < whole; i += kWidth) f(Pack::load(x + done + i)).store(results + i);
+    T* const to = kDirect ? out + done : results;
+    for (std::size_t i = 0; i < whole; i += kWidth) f(Pack::load(x + done + i)).store(to + i);
     if (whole < left) {
       // The rest, filled up with its first number, which f takes as well.
       T rest[kWidth];
       for (std::size_t k = 0; k < kWidth; ++k) rest[k] = x[done + whole + (whole + k < left ? k : 0)];
       f(Pack::load(rest)).store(results + whole);
     }
-    for (std::size_t i = 0; i < whole; i += kWidth) Pack::load(results + i).store(out + done + i);
+    for (std::size_t i = 0; i < whole && !kDirect; i += kWidth) Pack::load(results + i).store(out + done + i);
     for (std::size_t i = whole; i < left; ++i) out[done + i] = results[i];
   }
 }
