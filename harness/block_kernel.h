@@ -6,8 +6,8 @@
 
 #include "harness/kernel.h"
 #include "harness/walker.h"
-#include "media/inversion.h"
 #include "media/elementary.h"
+#include "media/inversion.h"
 
 namespace nullmark {
 
@@ -237,11 +237,22 @@ class BlockKernel : public Kernel {
         }
         audit(ray, state.flight[k], extinction, counters);
         estimator_.consume(state.walk[k], ray, state.flight[k], extinction, state.rng[k]);
+        if constexpr (recorded)
+          if (state.recording->closely) write_closely(state, k, state.recording->walks[recorded_before + k]);
         if (++lookups[k] == state.most_lookups) {
           ++counters.overruns;
           active = 0;
         }
       }
+    }
+  }
+
+  void write_closely(const State& state, std::uint32_t k, Recording::Walk& walk) const {
+    walk.drawn.push_back(state.rng[k].draws());
+    if constexpr (kTellsProfile) {
+      walk.transmittance.resize(walk.drawn.size() * static_cast<std::size_t>(channels_));
+      store(estimator_.transmittance_at(state.walk[k], state.ray, state.flight[k].position()),
+            &walk.transmittance[(walk.drawn.size() - 1) * static_cast<std::size_t>(channels_)]);
     }
   }
 

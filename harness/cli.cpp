@@ -79,6 +79,7 @@ class CommandLine {
     app_.require_subcommand(1);
     app_.failure_message(CLI::FailureMessage::simple);
     add_run();
+    add_replay();
     add_check();
     add_compare();
     add_gate();
@@ -155,6 +156,18 @@ class CommandLine {
             },
             "SECONDS"));
     command->add_flag("--no-timing", run_.no_timing, "Statistics only");
+  }
+
+  void add_replay() {
+    CLI::App* command = add("replay", "Draw one sample of a cell again: every random number, lookup and weight",
+                            [this] { return replay_command(replay_); });
+    command->add_option("RESULTS", replay_.results, "Results file")->required();
+    command->add_option("CELL", replay_.cell, "Name of a cell in it")->required();
+    CLI::Option* ray =
+        command->add_option("--ray", replay_.ray, "Ray, from 0 (default: of the sample farthest from its ray's target)");
+    command->add_option("--sample", replay_.sample, "Sample of the ray, from 0 (default: the one farthest from its target)")
+        ->needs(ray);
+    command->add_flag("--json", replay_.json, "As JSON, with all digits");
   }
 
   void add_check() {
@@ -289,6 +302,7 @@ class CommandLine {
   CLI::App app_{"Benchmark and validation harness for null-collision trackers", "nullmark"};
   std::function<ExitCode()> action_;
   RunCommand run_;
+  ReplayCommand replay_;
   GateCommand gate_;
   ReportCommand report_;
   ListCommand list_;

@@ -112,7 +112,7 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
   std::vector<std::vector<std::string>> lines = {{"cell", "rays", "samples/ray", "lookups/sample", "lookups", "seconds",
                                                   "bias shown from", "planned/ray", "verdict", "status"}};
   double total_samples = 0, total_lookups = 0, lookups_to_decide = 0;
-  bool all_known = true;
+  bool all_known = true, any = false;
   for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i) {
     if (!selected[i]) continue;
     const Prediction& prediction = predictions[next++];
@@ -126,6 +126,7 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
                      shown ? percent(*shown) : "-", short_number(static_cast<Real>(prediction.planned)), prediction.verdict,
                      prediction.status});
     if (prediction.status != "ok") continue;
+    any = true;
     total_samples += samples;
     total_lookups += lookups.value_or(0);
     if (prediction.verdict == "PASS")
@@ -140,7 +141,9 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
       "{:.4g} lookups with what the verdicts take\n",
       aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
       total_lookups * kNsPerLookup * 1e-9, kNsPerLookup, lookups_to_decide);
-  return ExitCode::ok;
+  if (any) return ExitCode::ok;
+  fmt::print(stderr, "nullmark: nothing would run: all cells are skipped\n");
+  return ExitCode::nothing_ran;
 }
 
 /// What earlier runs of the same configuration left, by place in the plan.

@@ -241,5 +241,13 @@ TEST_F(Cli, ListsSchemasAndVersion) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "c.results.json"));
 }
 
+TEST_F(Cli, ADryRunOfNothingEndsAsTheRunWould) {
+  write("v.json", R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
+      "matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"absent.vdb","optional":true}}}]})");
+  EXPECT_EQ(run("run v.json --dry-run"), code(ExitCode::nothing_ran));
+  EXPECT_EQ(read("err"), "nullmark: nothing would run: all cells are skipped\n");
+  EXPECT_EQ(run("run v.json"), code(ExitCode::nothing_ran));
+}
+
 }  // namespace
 }  // namespace nullmark

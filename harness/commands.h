@@ -22,6 +22,14 @@ struct RunCommand {
 };
 ExitCode run_command(const RunCommand& command);
 
+/// `nullmark replay`.
+struct ReplayCommand {
+  std::string results, cell;
+  std::string ray, sample;  ///< whole numbers; empty: to be searched for
+  bool json = false;
+};
+ExitCode replay_command(const ReplayCommand& command);
+
 /// `nullmark gate`.
 struct GateCommand {
   std::string baseline;             ///< results, a baseline, or a folder of baselines

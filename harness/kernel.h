@@ -65,8 +65,12 @@ struct Recording {
     std::uint64_t draws = 0;
     EventKind end = EventKind::escape;  ///< of samplers of free paths: how, and how far along the ray, the flight ended
     Real distance = 0;
+    std::vector<std::uint64_t> drawn{};  ///< per step: draws so far, those that the lookup led to included; where `closely`
+    /// [step * channels + c], after the lookup: the estimate of T up to it, of trackers that tell profiles; where `closely`.
+    std::vector<Real> transmittance{};
   };
   std::vector<Walk> walks;
+  bool closely = false;  ///< laws do without
 
   /// Adds n walks, in memory that `restart` has kept where there is some.
   void add(std::size_t n) {
