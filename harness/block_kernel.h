@@ -231,28 +231,18 @@ class BlockKernel : public Kernel {
         if constexpr (recorded) {
           Recording::Walk& walk = state.recording->walks[recorded_before + k];
           const Flight& at = state.flight[k];
-          walk.steps.push_back({at.position(), at.depth(), flies() ? at.rate() : 0});
+          walk.steps.push_back({at.position(), at.depth(), flies() ? at.rate() : 0, 0});
           walk.extinction.insert(walk.extinction.end(), &state.extinction[a * channels],
                                  &state.extinction[a * channels] + channels);
         }
         audit(ray, state.flight[k], extinction, counters);
         estimator_.consume(state.walk[k], ray, state.flight[k], extinction, state.rng[k]);
-        if constexpr (recorded)
-          if (state.recording->closely) write_closely(state, k, state.recording->walks[recorded_before + k]);
+        if constexpr (recorded) state.recording->walks[recorded_before + k].steps.back().draws = state.rng[k].draws();
         if (++lookups[k] == state.most_lookups) {
           ++counters.overruns;
           active = 0;
         }
       }
-    }
-  }
-
-  void write_closely(const State& state, std::uint32_t k, Recording::Walk& walk) const {
-    walk.drawn.push_back(state.rng[k].draws());
-    if constexpr (kTellsProfile) {
-      walk.transmittance.resize(walk.drawn.size() * static_cast<std::size_t>(channels_));
-      store(estimator_.transmittance_at(state.walk[k], state.ray, state.flight[k].position()),
-            &walk.transmittance[(walk.drawn.size() - 1) * static_cast<std::size_t>(channels_)]);
     }
   }
 

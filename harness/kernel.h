@@ -53,9 +53,10 @@ struct Counters {
 /// What walks did, one entry per sample in the order drawn: for replay, and for laws that a mean does not show.
 struct Recording {
   struct Step {
-    Real position;  ///< of the lookup, world length
-    Real depth;     ///< int rate from the ray's begin to it
-    Real rate;      ///< of the flight there, 1/length
+    Real position;        ///< of the lookup, world length
+    Real depth;           ///< int rate from the ray's begin to it
+    Real rate;            ///< of the flight there, 1/length
+    std::uint64_t draws;  ///< so far, those that the lookup led to included
   };
   struct Walk {
     std::vector<Step> steps;
@@ -65,12 +66,8 @@ struct Recording {
     std::uint64_t draws = 0;
     EventKind end = EventKind::escape;  ///< of samplers of free paths: how, and how far along the ray, the flight ended
     Real distance = 0;
-    std::vector<std::uint64_t> drawn{};  ///< per step: draws so far, those that the lookup led to included; where `closely`
-    /// [step * channels + c], after the lookup: the estimate of T up to it, of trackers that tell profiles; where `closely`.
-    std::vector<Real> transmittance{};
   };
   std::vector<Walk> walks;
-  bool closely = false;  ///< laws do without
 
   /// Adds n walks, in memory that `restart` has kept where there is some.
   void add(std::size_t n) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 
 #include "harness/config.h"
 #include "harness/names.h"
@@ -27,16 +28,16 @@ class Sampler {
 
   Workspace& workspace() { return *workspace_; }
 
-  void begin_ray(std::size_t ray) {
+  void begin_ray(std::size_t ray, std::span<const Real> marks = {}) {
     cell_.scene->context(ray, kernel_, context_);
+    if (!marks.empty()) context_.marks = marks;
     kernel_.begin_ray(*workspace_, *cell_.scene->medium->medium, cell_.scene->medium->extrema, context_);
   }
 
   /// Samples first .. first + count - 1 of the ray that was begun.
-  const SampleBlock& draw(std::uint64_t first, std::size_t count) {
+  const SampleBlock& draw(std::uint64_t first, std::size_t count, Quantity quantity) {
     Counters counters;
-    kernel_.sample(*workspace_, *cell_.scene->medium->medium, context_, key_, first, count, cell_.cell->quantity, block_,
-                   counters);
+    kernel_.sample(*workspace_, *cell_.scene->medium->medium, context_, key_, first, count, quantity, block_, counters);
     if (counters.overruns > 0)
       throw InputError(fmt::format("{}: ray {}, samples {} to {}: a walk takes more than {} lookups", cell_.cell->name,
                                    context_.index, first, first + count - 1, workspace_->most_lookups));
@@ -64,7 +65,7 @@ Suspect farthest(const PreparedCell& cell, Sampler& sampler, std::size_t ray, st
   Suspect result;
   sampler.begin_ray(ray);
   for (std::uint64_t first = 0; first < samples; first += kBatch) {
-    const std::vector<Real>& values = sampler.draw(first, std::min(kBatch, samples - first)).values;
+    const std::vector<Real>& values = sampler.draw(first, std::min(kBatch, samples - first), cell.cell->quantity).values;
     for (std::size_t i = 0; i < values.size(); ++i) {
       Real distance = std::abs(values[i] - cell.targets.mean[ray * outputs + i % outputs]);
       if (!std::isfinite(distance)) distance = kInfinity;
@@ -120,18 +121,31 @@ std::vector<Real> numbers(const SampleAddress& address, std::uint64_t count) {
   return result;
 }
 
-Recording::Walk walk_of(const PreparedCell& cell, const SampleChoice& choice) {
-  std::shared_ptr<const Kernel> kernel = cell.kernel;
-  if (cell.cell->precision == Precision::float32)
-    kernel = make_estimator(cell.cell->estimator)->kernel(cell.scene->medium->medium->channels());
-  Sampler sampler(cell, *kernel);
+/// The cell's tracker in double.
+std::shared_ptr<const Kernel> recorded_kernel(const PreparedCell& cell) {
+  if (cell.cell->precision == Precision::float64) return cell.kernel;
+  return make_estimator(cell.cell->estimator)->kernel(cell.scene->medium->medium->channels());
+}
+
+Recording::Walk walk_of(const PreparedCell& cell, const Kernel& kernel, const SampleChoice& choice) {
+  Sampler sampler(cell, kernel);
   Recording recording;
-  recording.closely = true;
   sampler.workspace().recording = &recording;
   sampler.workspace().most_lookups = kMostSteps;
   sampler.begin_ray(*choice.ray);
-  sampler.draw(*choice.sample, 1);
+  sampler.draw(*choice.sample, 1, cell.cell->quantity);
   return recording.walks.at(0);
+}
+
+/// The same walk, asked for its profile at its own steps.
+std::vector<Real> transmittance_along(const PreparedCell& cell, const Kernel& kernel, const SampleChoice& choice,
+                                      const Recording::Walk& walk) {
+  if (walk.steps.empty() || !kernel.answers(Quantity::transmittance_profile)) return {};
+  std::vector<Real> marks;
+  for (const Recording::Step& step : walk.steps) marks.push_back(step.position);
+  Sampler sampler(cell, kernel);
+  sampler.begin_ray(*choice.ray, marks);
+  return sampler.draw(*choice.sample, 1, Quantity::transmittance_profile).values;
 }
 
 std::vector<std::string> output_names(const PreparedCell& cell) {
@@ -172,12 +186,14 @@ Replay replay_sample(const RunRecord& run, const std::string& file, const std::s
   replay.precision = cell.cell->precision;
   replay.channels = cell.scene->medium->medium->channels();
   replay.outputs = output_names(cell);
-  replay.walk = walk_of(cell, choice);
+  const std::shared_ptr<const Kernel> recorded = recorded_kernel(cell);
+  replay.walk = walk_of(cell, *recorded, choice);
+  replay.transmittance = transmittance_along(cell, *recorded, choice, replay.walk);
   const SampleAddress address{stream_key(*cell.cell, *cell.scene->medium), static_cast<std::uint32_t>(replay.ray), replay.sample};
   replay.draws = numbers(address, replay.walk.draws);
   Sampler sampler(cell, *cell.kernel);
   sampler.begin_ray(replay.ray);
-  const SampleBlock& drawn = sampler.draw(replay.sample, 1);
+  const SampleBlock& drawn = sampler.draw(replay.sample, 1, replay.quantity);
   replay.values = drawn.values;
   replay.lookups = drawn.lookups[0];
   for (std::size_t o = 0; o < replay.values.size(); ++o)

@@ -29,9 +29,11 @@ struct Replay {
   std::vector<std::optional<Real>> targets;  ///< their means, where known
   std::uint32_t lookups = 0;
   std::vector<Real> draws;  ///< uniform numbers in [0, 1), in their order
-  /// Steps of its one flight, written down closely; none of paths, which fly many times.  Where the cell samples in float, those
-  /// of the same numbers in double.
+  /// Its one flight, without steps of paths, which fly many times.  Where the cell samples in float it is that of the same
+  /// numbers in double.
   Recording::Walk walk;
+  /// [step * channels + c]: the estimate of T up to each lookup, that included; empty of trackers that tell no profile.
+  std::vector<Real> transmittance;
 };
 
 /// Draws a sample of a cell of the results again.  Where no sample is chosen it is the one that a mean suffers from most, among

@@ -60,11 +60,11 @@ std::string steps_text(const Replay& replay) {
   std::uint64_t drawn = 0;
   for (std::size_t i = 0; i < walk.steps.size(); ++i) {
     const Recording::Step& step = walk.steps[i];
-    lines.push_back({fmt::to_string(i + 1), words(draws.subspan(drawn, walk.drawn[i] - drawn)),
-                     fmt::format("{:.9g}", step.position), fmt::format("{:.9g}", step.depth),
-                     step.rate > 0 ? fmt::format("{:.9g}", step.rate) : "-", words(of_step(walk.extinction, i, replay.channels)),
-                     words(of_step(walk.transmittance, i, replay.channels))});
-    drawn = walk.drawn[i];
+    lines.push_back({fmt::to_string(i + 1), words(draws.subspan(drawn, step.draws - drawn)), fmt::format("{:.9g}", step.position),
+                     fmt::format("{:.9g}", step.depth), step.rate > 0 ? fmt::format("{:.9g}", step.rate) : "-",
+                     words(of_step(walk.extinction, i, replay.channels)),
+                     words(of_step(replay.transmittance, i, replay.channels))});
+    drawn = step.draws;
   }
   lines.push_back({"end", words(draws.subspan(drawn)), "", "", "", "", end_text(replay)});
   return aligned(lines, 2);
@@ -99,8 +99,8 @@ Json replay_json(const Replay& replay) {
                   {"majorant_depth", number(step.depth)},
                   {"majorant", step.rate > 0 ? number(step.rate) : Json()},
                   {"extinction", numbers(of_step(walk.extinction, i, replay.channels))},
-                  {"draws", walk.drawn[i]}};
-    if (!walk.transmittance.empty()) entry["transmittance"] = numbers(of_step(walk.transmittance, i, replay.channels));
+                  {"draws", step.draws}};
+    if (!replay.transmittance.empty()) entry["transmittance"] = numbers(of_step(replay.transmittance, i, replay.channels));
     json["steps"].push_back(std::move(entry));
   }
   if (const std::string end = end_text(replay); !end.empty()) json["flight"] = end;
