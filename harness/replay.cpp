@@ -9,9 +9,9 @@
 #include <memory>
 #include <span>
 
+#include "estimators/lane_rng.h"
 #include "harness/config.h"
 #include "harness/names.h"
-#include "harness/parameter_values.h"
 #include "harness/table.h"
 
 namespace nullmark {
@@ -23,8 +23,11 @@ constexpr std::uint32_t kMostSteps = 1u << 22;
 /// One thread's way to a cell's samples.
 class Sampler {
  public:
-  Sampler(const PreparedCell& cell, const Kernel& kernel)
-      : cell_(cell), kernel_(kernel), workspace_(kernel.workspace()), key_(stream_key(*cell.cell, *cell.scene->medium)) {}
+  Sampler(const PreparedCell& cell)
+      : cell_(cell),
+        kernel_(*cell.kernel),
+        workspace_(cell.kernel->workspace()),
+        key_(stream_key(*cell.cell, *cell.scene->medium)) {}
 
   Workspace& workspace() { return *workspace_; }
 
@@ -36,13 +39,16 @@ class Sampler {
 
   /// Samples first .. first + count - 1 of the ray that was begun.
   const SampleBlock& draw(std::uint64_t first, std::size_t count, Quantity quantity) {
-    Counters counters;
-    kernel_.sample(*workspace_, *cell_.scene->medium->medium, context_, key_, first, count, quantity, block_, counters);
-    if (counters.overruns > 0)
+    counters_ = {};
+    kernel_.sample(*workspace_, *cell_.scene->medium->medium, context_, key_, first, count, quantity, block_, counters_);
+    if (counters_.overruns > 0)
       throw InputError(fmt::format("{}: ray {}, samples {} to {}: a walk takes more than {} lookups", cell_.cell->name,
                                    context_.index, first, first + count - 1, workspace_->most_lookups));
     return block_;
   }
+
+  /// Random numbers that the last samples took.
+  std::uint64_t draws() const { return counters_.draws; }
 
  private:
   const PreparedCell& cell_;
@@ -51,6 +57,7 @@ class Sampler {
   std::uint64_t key_;
   RayContext context_;
   SampleBlock block_;
+  Counters counters_;
 };
 
 struct Suspect {
@@ -79,7 +86,7 @@ SampleChoice search(const PreparedCell& cell, std::uint64_t samples, const Sampl
   const std::size_t rays = cell.scene->rays->world.size();
   const std::size_t from = choice.ray.value_or(0), to = choice.ray ? from + 1 : rays;
   std::vector<Suspect> suspects(to - from);
-  tbb::enumerable_thread_specific<Sampler> samplers([&] { return Sampler(cell, *cell.kernel); });
+  tbb::enumerable_thread_specific<Sampler> samplers([&] { return Sampler(cell); });
   tbb::parallel_for(from, to, [&](std::size_t ray) { suspects[ray - from] = farthest(cell, samplers.local(), ray, samples); });
   const auto worst = std::max_element(suspects.begin(), suspects.end(),
                                       [](const Suspect& a, const Suspect& b) { return a.distance < b.distance; });
@@ -113,22 +120,27 @@ std::uint64_t samples_per_ray(const PreparedCell& cell, const CellRecord& record
   return std::max(record.samples / record.rays, record.verdict ? record.verdict->samples_per_ray : 0);
 }
 
-/// The numbers that a sample drew, from the stream's begin.
-std::vector<Real> numbers(const SampleAddress& address, std::uint64_t count) {
-  Rng rng(address);
+/// The numbers that a sample drew, from its stream's begin.
+std::vector<Real> numbers(const SampleAddress& address, std::uint64_t count, Precision precision) {
   std::vector<Real> result(count);
-  for (Real& u : result) u = rng.uniform();
+  if (precision == Precision::float32) {
+    using Streams = LaneRng<float, 1>;
+    Streams::State state = Streams::seeded(address);
+    Streams rng(state, Streams::Mask::first(1));
+    for (Real& u : result) {
+      float single = 0;
+      rng.uniform().store(&single);
+      u = static_cast<Real>(single);
+    }
+  } else {
+    Rng rng(address);
+    for (Real& u : result) u = rng.uniform();
+  }
   return result;
 }
 
-/// The cell's tracker in double.
-std::shared_ptr<const Kernel> recorded_kernel(const PreparedCell& cell) {
-  if (cell.cell->precision == Precision::float64) return cell.kernel;
-  return make_estimator(cell.cell->estimator)->kernel(cell.scene->medium->medium->channels());
-}
-
-Recording::Walk walk_of(const PreparedCell& cell, const Kernel& kernel, const SampleChoice& choice) {
-  Sampler sampler(cell, kernel);
+Recording::Walk walk_of(const PreparedCell& cell, const SampleChoice& choice) {
+  Sampler sampler(cell);
   Recording recording;
   sampler.workspace().recording = &recording;
   sampler.workspace().most_lookups = kMostSteps;
@@ -138,12 +150,11 @@ Recording::Walk walk_of(const PreparedCell& cell, const Kernel& kernel, const Sa
 }
 
 /// The same walk, asked for its profile at its own steps.
-std::vector<Real> transmittance_along(const PreparedCell& cell, const Kernel& kernel, const SampleChoice& choice,
-                                      const Recording::Walk& walk) {
-  if (walk.steps.empty() || !kernel.answers(Quantity::transmittance_profile)) return {};
+std::vector<Real> transmittance_along(const PreparedCell& cell, const SampleChoice& choice, const Recording::Walk& walk) {
+  if (walk.steps.empty() || !cell.kernel->answers(Quantity::transmittance_profile)) return {};
   std::vector<Real> marks;
   for (const Recording::Step& step : walk.steps) marks.push_back(step.position);
-  Sampler sampler(cell, kernel);
+  Sampler sampler(cell);
   sampler.begin_ray(*choice.ray, marks);
   return sampler.draw(*choice.sample, 1, Quantity::transmittance_profile).values;
 }
@@ -186,14 +197,15 @@ Replay replay_sample(const RunRecord& run, const std::string& file, const std::s
   replay.precision = cell.cell->precision;
   replay.channels = cell.scene->medium->medium->channels();
   replay.outputs = output_names(cell);
-  const std::shared_ptr<const Kernel> recorded = recorded_kernel(cell);
-  replay.walk = walk_of(cell, *recorded, choice);
-  replay.transmittance = transmittance_along(cell, *recorded, choice, replay.walk);
-  const SampleAddress address{stream_key(*cell.cell, *cell.scene->medium), static_cast<std::uint32_t>(replay.ray), replay.sample};
-  replay.draws = numbers(address, replay.walk.draws);
-  Sampler sampler(cell, *cell.kernel);
+  if (replay.precision == Precision::float64) {
+    replay.walk = walk_of(cell, choice);
+    replay.transmittance = transmittance_along(cell, choice, replay.walk);
+  }
+  Sampler sampler(cell);
   sampler.begin_ray(replay.ray);
   const SampleBlock& drawn = sampler.draw(replay.sample, 1, replay.quantity);
+  replay.draws = numbers({stream_key(*cell.cell, *cell.scene->medium), static_cast<std::uint32_t>(replay.ray), replay.sample},
+                         sampler.draws(), replay.precision);
   replay.values = drawn.values;
   replay.lookups = drawn.lookups[0];
   for (std::size_t o = 0; o < replay.values.size(); ++o)

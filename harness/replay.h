@@ -29,8 +29,7 @@ struct Replay {
   std::vector<std::optional<Real>> targets;  ///< their means, where known
   std::uint32_t lookups = 0;
   std::vector<Real> draws;  ///< uniform numbers in [0, 1), in their order
-  /// Its one flight, without steps of paths, which fly many times.  Where the cell samples in float it is that of the same
-  /// numbers in double.
+  /// Its one flight; without steps where it was a path, which flies many times, and in float, where registers write none down.
   Recording::Walk walk;
   /// [step * channels + c]: the estimate of T up to each lookup, that included; empty of trackers that tell no profile.
   std::vector<Real> transmittance;

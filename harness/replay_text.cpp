@@ -115,7 +115,6 @@ std::string replay_text(const Replay& replay) {
     text += fmt::format("{} {:.9g}{}\n", replay.outputs[o], replay.values[o],
                         replay.targets[o] ? fmt::format(", expected {:.9g}", *replay.targets[o]) : "");
   text += fmt::format("{} lookups, {} random numbers\n\n", replay.lookups, replay.draws.size());
-  if (replay.precision == Precision::float32) text += "The steps below are those of the same random numbers in double.\n";
   if (replay.walk.steps.empty() && replay.lookups > 0) return text + fmt::format("random numbers {}\n", words(replay.draws));
   return text + steps_text(replay);
 }
