@@ -43,17 +43,19 @@ Measurement read_measurement(const Place& place) {
 std::uint64_t read_samples(const Place& place) { return place.unsigned_integer(1, std::uint64_t{1} << 53); }
 
 GateSpec read_gate(const Place& place) {
-  place.expect_keys({"enabled", "epsilon", "max_samples_per_ray", "max_lookups_per_ray", "laws"});
+  place.expect_keys({"enabled", "epsilon", "max_samples_per_ray", "max_lookups_per_ray", "laws", "tolerate", "samples"});
   GateSpec gate;
   if (place.has("enabled")) gate.enabled = place["enabled"].boolean();
   if (place.has("epsilon")) gate.epsilon = place["epsilon"].positive();
   if (place.has("max_samples_per_ray"))
     gate.max_samples_per_ray = place["max_samples_per_ray"].unsigned_integer(0, std::uint64_t{1} << 53);
   if (place.has("max_lookups_per_ray")) gate.max_lookups_per_ray = place["max_lookups_per_ray"].positive();
-  if (place.has("laws")) {
-    const std::string policy = place["laws"].one_of(law_policies(), "policy");
-    gate.laws = static_cast<LawPolicy>(std::find(law_policies().begin(), law_policies().end(), policy) - law_policies().begin());
-  }
+  const auto choice = [&](const char* key, const std::vector<std::string>& names, const char* what) {
+    return std::find(names.begin(), names.end(), place[key].one_of(names, what)) - names.begin();
+  };
+  if (place.has("laws")) gate.laws = static_cast<LawPolicy>(choice("laws", law_policies(), "policy"));
+  if (place.has("tolerate")) gate.tolerate = static_cast<Tolerate>(choice("tolerate", tolerances(), "bias to tolerate"));
+  if (place.has("samples")) gate.all_samples = choice("samples", sample_policies(), "policy") == 1;
   return gate;
 }
 

@@ -80,13 +80,18 @@ struct Measurement {
 /// When the laws of a cell's walks are tested: where its mean is undecidable, or always, or never.
 enum class LawPolicy { undecided, always, never };
 
+/// Which bias is a FAIL: any that is proven, or one that is proven to be beyond epsilon.
+enum class Tolerate { nothing, epsilon };
+
 /// What a cell's verdict must prove and what that may cost.
 struct GateSpec {
   bool enabled = true;
   std::optional<Real> epsilon{};              ///< relative to the mean reference; left out: by the optical depth, see gate.cpp
-  std::uint64_t max_samples_per_ray = 0;      ///< beyond samples_per_ray, where undecided; 0: no further ones
+  /// Where undecided; 0: samples_per_ray, and up to four times as many where they were enough by the plan.
+  std::uint64_t max_samples_per_ray = 0;
   std::optional<Real> max_lookups_per_ray{};  ///< expected lookups that all samples of a ray may cost
-
+  Tolerate tolerate = Tolerate::nothing;
+  bool all_samples = false;  ///< drawn while undecided, also where the plan knows that they are too few
   LawPolicy laws = LawPolicy::undecided;
 
   bool operator==(const GateSpec&) const = default;

@@ -54,8 +54,9 @@ struct TimeRecord {
   std::optional<Real> waiting{};     ///< share of the wall time in which the timed thread did not run, median over repetitions
 };
 
-/// PASS: |bias| < epsilon is proven.  FAIL: bias is proven.  INCONCLUSIVE: neither, with the reason.  VIOLATED: the estimator
-/// needs a true majorant and did not have one.  Empty: nothing is claimed, or nothing was tested.
+/// PASS: |bias| < epsilon is proven.  FAIL: a bias is proven (or one beyond epsilon, as `Tolerate` says).  INCONCLUSIVE: neither,
+/// with the reason.  VIOLATED: the estimator needs a true majorant and did not have one.  Empty: nothing is claimed, or nothing
+/// was tested.
 enum class Outcome { none, pass, fail, inconclusive, violated };
 
 /// Evidence of one test, as `check` derives its outcome.
@@ -64,9 +65,14 @@ struct TestRecord {
   int group = -1;   ///< -1: all rays
   std::uint64_t samples = 0;
   Real epsilon = 0, reference_error = 0;  ///< absolute
+  Real reference = 0;                     ///< expected mean, averaged over the rays of the test
+  Real mean_error = 0;                    ///< of the samples against it
   Real variance = 0;                      ///< that the bets were planned with
-  std::string basis;                      ///< "betting", "catoni", "catoni+betting", "deterministic"
-  Real log_e_fail = 0, log_e_low = 0, log_e_high = 0;
+  /// "betting", "catoni", "catoni+betting", "deterministic", "none" (nothing could be bet), or "counted" (lookups, where the
+  /// harness draws the flights: see counted_lookups.h).
+  std::string basis;
+  /// Against "mean error 0", "at most -epsilon", "at least epsilon", "within epsilon".
+  Real log_e_fail = 0, log_e_low = 0, log_e_high = 0, log_e_beyond = 0;
   Real largest_error = 0, rounding = 0;  ///< of single samples; deterministic tests
   std::uint64_t planned = 0;             ///< samples per ray
   std::vector<Real> rates;               ///< of the bets against "mean error 0"
@@ -87,10 +93,15 @@ struct VerdictRecord {
   Outcome unbiased = Outcome::none, own_mean = Outcome::none;
   Outcome lookups = Outcome::none;
   std::string reason;                         ///< of an INCONCLUSIVE, or what fails
+  std::string proves;                         ///< what a PASS proves: "|bias| < 0.37 % of the mean"
+  Tolerate tolerate = Tolerate::nothing;
+  bool within = false, beyond = false, biased = false;  ///< what is proven of the mean error: see verdict.h
   std::string against;                        ///< "reference", or "own mean" of an estimator that predicts its bias
   std::string variance_basis;                 ///< "analytic", "pilot" or "none"
   bool planned_undecidable = false;           ///< the plan said beforehand that no affordable number of samples decides
-  bool violated = false;                      ///< needs a true majorant, and violations were counted
+  bool violated = false;                      ///< needs a true majorant, and the extinction was seen above it
+  bool bound_unproven = false;                ///< the majorant is not known to bound, and nothing was seen above it
+  std::uint64_t counted_walks = 0;            ///< whose lookups were found to be their collisions, one by one
   std::uint64_t nonfinite = 0;                ///< among the samples beyond the planned ones
   std::uint64_t out_of_range = 0;             ///< samples outside the range the estimator declares
   std::uint64_t samples_per_ray = 0;          ///< used in the end
@@ -99,7 +110,8 @@ struct VerdictRecord {
   Real alpha = 1e-4, alpha_pass = 1e-3;
   std::vector<TestRecord> tests;
   std::uint64_t laws_family = 1;
-  std::vector<LawRecord> laws;     ///< tested where the mean cannot be decided, or on request
+  std::vector<LawRecord> laws;        ///< how samples and walks behave beside their mean: see laws.h
+  std::vector<std::string> untested;  ///< what the claims rest on and no law tests, with the reason
   Outcome lawful = Outcome::none;  ///< PASS: no law is broken
 };
 
@@ -110,6 +122,8 @@ struct CellRecord {
   std::string medium_hash;
   std::optional<StructureSize> structure;  ///< of the majorant; absent where it was not built
   std::string claims, range;
+  bool given_depth = false;      ///< the estimator is handed the exact optical depth
+  std::optional<Real> reliance;  ///< of such: how much of its answer is that depth, 1 all of it; see reliance.h
   std::optional<Real> order;  ///< of a consistent estimator's bias in its step
   int channels = 1;
   std::vector<std::string> outputs;  ///< of quantities with several numbers a channel, what each entry of `channel` is

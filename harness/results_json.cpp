@@ -249,6 +249,7 @@ Json cell_json(const CellRecord& record) {
   estimator["claims"] = record.claims;
   estimator["range"] = record.range;
   if (record.order) estimator["order"] = *record.order;
+  if (record.given_depth) estimator["given_depth"] = true;
   Json medium = typed(record.medium);
   medium["hash"] = record.medium_hash;
   Json majorant = typed(record.majorant);
@@ -278,6 +279,7 @@ Json cell_json(const CellRecord& record) {
   json.update(Json{
       {"samples", record.samples}, {"seed", cell.seed}, {"own_streams", cell.own_streams}, {"status", to_string(record.status)}});
   if (!record.reason.empty()) json["reason"] = record.reason;
+  if (record.reliance) json["reliance"] = real(record.reliance);
   json.update(Json{
       {"mean", field(record, &ChannelRecord::mean)},
       {"reference",
@@ -327,6 +329,8 @@ CellRecord read_cell(const Place& place) {
   record.claims = place["estimator"]["claims"].string();
   record.range = place["estimator"]["range"].string();
   record.order = optional_real(place["estimator"], "order");
+  if (place["estimator"].has("given_depth")) record.given_depth = place["estimator"]["given_depth"].boolean();
+  record.reliance = optional_real(place, "reliance");
   record.medium = read_medium(place["medium"]);
   record.medium_hash = string_or_empty(place["medium"], "hash");
   record.majorant = read_component(ComponentKind::majorant, place["majorant"]);

@@ -131,10 +131,15 @@ Json definitions() {
       closed_object(
           {{"enabled", {{"type", "boolean"}, {"default", true}}},
            {"epsilon", described(positive(), "|bias| that PASS excludes, relative to the mean reference")},
-           {"max_samples_per_ray", described(whole(0), "drawn while the verdict is open; 0: only samples_per_ray")},
+           {"max_samples_per_ray", described(whole(0), "drawn while the verdict is open; 0: samples_per_ray, and up to four times as many where the plan says that they are enough")},
            {"max_lookups_per_ray", described(positive(), "expected lookups that all samples of a ray may cost")},
            {"laws", described({{"enum", law_policies()}},
-                              "when the laws of walks are tested: undecided means only where the mean cannot decide")}}),
+                              "when the laws of walks are tested: undecided means only where the mean cannot decide")},
+           {"tolerate", described({{"enum", tolerances()}},
+                                  "which bias is a FAIL: nothing means any that is proven, epsilon one beyond epsilon")},
+           {"samples", described({{"enum", sample_policies()}},
+                                 "what an undecided cell may draw: planned stops where the plan says that the allowance cannot "
+                                 "decide it, all draws the allowance all the same")}}),
       "what the verdict must prove and may cost");
   cell["reference"] = described(closed_object({{"value", one_or_list(Json{{"type", "number"}})},
                                                {"error", {{"type", "number"}, {"minimum", 0}}},
@@ -251,6 +256,8 @@ Json cell_schema() {
        {"status",
         {{"enum", {to_string(Status::ok), to_string(Status::skipped), to_string(Status::not_run), to_string(Status::error)}}}},
        {"reason", text},
+       {"reliance", described(nullable("number"), "of an estimator that is handed the exact optical depth: how much of its answer "
+                                                  "follows that depth, 1 all of it")},
        {"mean", statistic("average over the rays")},
        {"reference", object_schema({{"value", statistic("average over the rays")},
                                     {"error", statistic("bound on the reference's own error")},

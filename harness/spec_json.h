@@ -20,6 +20,8 @@ Json reference_json(const GivenReference& reference);
 Json measurement_json(const Measurement& measurement);
 /// In the order of LawPolicy.
 const std::vector<std::string>& law_policies();
+const std::vector<std::string>& tolerances();
+const std::vector<std::string>& sample_policies();
 Json gate_json(const GateSpec& gate);
 
 /// What decides a cell's statistics, as canonical text, hashed to 16 hexadecimal digits.

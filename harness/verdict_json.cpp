@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "harness/kernel.h"
+#include "harness/spec_json.h"
 
 namespace nullmark {
 namespace {
@@ -16,7 +17,7 @@ constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
 
 const std::vector<std::string> kOutcomes = {"", "PASS", "FAIL", "INCONCLUSIVE", "VIOLATED"};
 
-const std::vector<std::string> kBases = {"betting", "catoni", "catoni+betting", "deterministic"};
+const std::vector<std::string> kBases = {"betting", "catoni", "catoni+betting", "deterministic", "none", "counted"};
 
 Json real(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 
@@ -38,12 +39,16 @@ bool deterministic(const TestRecord& test) { return test.basis == "deterministic
 Json test_json(const TestRecord& test) {
   Json json = {{"channel", test.channel},         {"samples", test.samples},
                {"epsilon", real(test.epsilon)},   {"reference_error", real(test.reference_error)},
-               {"variance", real(test.variance)}, {"basis", test.basis}};
+               {"variance", real(test.variance)}, {"basis", test.basis},
+               {"reference", real(test.reference)}, {"mean_error", real(test.mean_error)}};
   if (deterministic(test)) {
     json["largest_error"] = real(test.largest_error);
     json["rounding"] = real(test.rounding);
   } else {
-    json["log_e"] = {{"fail", real(test.log_e_fail)}, {"low", real(test.log_e_low)}, {"high", real(test.log_e_high)}};
+    json["log_e"] = {{"fail", real(test.log_e_fail)},
+                     {"low", real(test.log_e_low)},
+                     {"high", real(test.log_e_high)},
+                     {"beyond", real(test.log_e_beyond)}};
     json["planned"] = test.planned;
     json["rates"] = test.rates;
   }
@@ -63,6 +68,9 @@ Json groups_json(const std::vector<const TestRecord*>& groups) {
   list("log_e_fail", &TestRecord::log_e_fail);
   list("log_e_low", &TestRecord::log_e_low);
   list("log_e_high", &TestRecord::log_e_high);
+  list("log_e_beyond", &TestRecord::log_e_beyond);
+  list("reference", &TestRecord::reference);
+  list("mean_error", &TestRecord::mean_error);
   if (std::any_of(groups.begin(), groups.end(), [](const TestRecord* test) { return deterministic(*test); })) {
     list("largest_error", &TestRecord::largest_error);
     list("rounding", &TestRecord::rounding);
@@ -79,6 +87,8 @@ TestRecord read_test(const Place& place) {
   test.reference_error = read_real(place, "reference_error", kInfinity);
   test.variance = read_real(place, "variance", kInfinity);
   test.basis = place["basis"].one_of(kBases, "basis");
+  test.reference = read_real(place, "reference", 0);
+  test.mean_error = read_real(place, "mean_error", 0);
   test.largest_error = read_real(place, "largest_error", kInfinity);
   test.rounding = read_real(place, "rounding", 0);
   if (test.basis != "deterministic") {
@@ -87,9 +97,11 @@ TestRecord read_test(const Place& place) {
     test.log_e_fail = read_real(log_e, "fail", -kInfinity);
     test.log_e_low = read_real(log_e, "low", -kInfinity);
     test.log_e_high = read_real(log_e, "high", -kInfinity);
+    test.log_e_beyond = read_real(log_e, "beyond", -kInfinity);
     test.planned = place["planned"].unsigned_integer(0, kAny);
     if (place.has("rates"))
-      for (const Place& rate : place["rates"].elements()) test.rates.push_back(rate.number());
+      for (const Place& rate : place["rates"].elements())
+        if (!rate.json().is_null()) test.rates.push_back(rate.number());
   }
   test.outcome = read_outcome(place["outcome"]);
   return test;
@@ -113,11 +125,15 @@ void read_groups(const Place& place, int channel, std::vector<TestRecord>& tests
     groups[i].epsilon = read_real(place, "epsilon", 0);
     groups[i].samples = place["samples"].unsigned_integer(0, kAny);
     groups[i].largest_error = kInfinity;
+    groups[i].log_e_beyond = -kInfinity;
   }
   read("reference_error", &TestRecord::reference_error, kInfinity);
   read("log_e_fail", &TestRecord::log_e_fail, -kInfinity);
   read("log_e_low", &TestRecord::log_e_low, -kInfinity);
   read("log_e_high", &TestRecord::log_e_high, -kInfinity);
+  read("log_e_beyond", &TestRecord::log_e_beyond, -kInfinity);
+  read("reference", &TestRecord::reference, 0);
+  read("mean_error", &TestRecord::mean_error, 0);
   read("largest_error", &TestRecord::largest_error, kInfinity);
   read("rounding", &TestRecord::rounding, 0);
   tests.insert(tests.end(), groups.begin(), groups.end());
@@ -139,10 +155,20 @@ Json verdict_json(const VerdictRecord& verdict) {
   for (const LawRecord& law : verdict.laws)
     laws.push_back(
         {{"name", law.name}, {"log_e", real(law.log_e)}, {"samples", law.samples}, {"outcome", outcome_json(law.outcome)}});
+  Json proven = Json::array();
+  if (verdict.within) proven.push_back("within");
+  if (verdict.beyond) proven.push_back("beyond");
+  if (verdict.biased) proven.push_back("biased");
   return {{"unbiased", outcome_json(verdict.unbiased)},
           {"own_mean", outcome_json(verdict.own_mean)},
           {"lookups", outcome_json(verdict.lookups)},
           {"reason", verdict.reason},
+          {"proves", verdict.proves},
+          {"proven", std::move(proven)},
+          {"tolerate", tolerances()[static_cast<std::size_t>(verdict.tolerate)]},
+          {"bound_unproven", verdict.bound_unproven},
+          {"counted_walks", verdict.counted_walks},
+          {"untested", verdict.untested},
           {"against", verdict.against},
           {"variance_basis", verdict.variance_basis},
           {"planned_undecidable", verdict.planned_undecidable},
@@ -169,6 +195,18 @@ VerdictRecord read_verdict(const Place& place) {
   verdict.own_mean = read_outcome(place["own_mean"]);
   verdict.lookups = read_outcome(place["lookups"]);
   verdict.reason = place["reason"].string();
+  if (place.has("proves")) verdict.proves = place["proves"].string();
+  if (place.has("proven"))
+    for (const Place& what : place["proven"].elements()) {
+      const std::string word = what.one_of({"within", "beyond", "biased"}, "finding");
+      (word == "within" ? verdict.within : word == "beyond" ? verdict.beyond : verdict.biased) = true;
+    }
+  if (place.has("tolerate") && place["tolerate"].one_of(tolerances(), "bias to tolerate") == tolerances()[1])
+    verdict.tolerate = Tolerate::epsilon;
+  if (place.has("bound_unproven")) verdict.bound_unproven = place["bound_unproven"].boolean();
+  if (place.has("counted_walks")) verdict.counted_walks = place["counted_walks"].unsigned_integer(0, kAny);
+  if (place.has("untested"))
+    for (const Place& law : place["untested"].elements()) verdict.untested.push_back(law.string());
   verdict.against = place["against"].one_of({"reference", "own mean"}, "target");
   verdict.variance_basis = place["variance_basis"].one_of({"analytic", "pilot", "none"}, "basis");
   verdict.planned_undecidable = place["planned_undecidable"].boolean();
