@@ -1,7 +1,6 @@
 #include "harness/bets.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace nullmark {
@@ -13,15 +12,17 @@ using Basis = ErrorLaw::Basis;
 /// Catoni's variance bound over the known variance: quadrature slack, and what PASS concedes ("given Var <= 1.25 sigma^2").
 constexpr Real kFailSlack = 1.02, kPassSlack = 1.25, kPilotSlack = 2;
 
-/// A bet may lose so much of its wealth at once.
-constexpr Real kMostLost = 0.9;
+/// A bet may lose so much of its wealth at once: of a planned rate, and of those that only hope.
+constexpr Real kMostLost = 0.9, kMostRisked = 0.5;
 
 /// Of epsilon/v: the rate of PASS, and the least against "0"; those of "beyond".
-constexpr Real kPassRate = 0.69, kLeastFailRate = 0.4, kMostPlannedRate = 1.6;
-constexpr std::array<Real, 2> kBeyondRates = {0.5, 2};
+constexpr Real kPassRate = 0.69, kLeastFailRate = 0.4, kMostPlannedRate = 1.6, kBeyondRate = 1;
 
 /// Evidence, in nats, that proves a bias in the largest families: what the highest rate should earn in the first look.
 constexpr Real kEvidence = 30;
+
+/// The highest rates bet on sums of so many errors: shorter ones cost more time than they save samples.
+constexpr int kShortestSum = 4;
 
 class Placing {
  public:
@@ -50,7 +51,8 @@ class Placing {
 
   void place_pass(Role role, int side, Real limit) {
     const Real loss = lost(side, limit);
-    const bool held_back = law_.basis == Basis::analytic && law_.variance < 0.5 * epsilon_ * loss;
+    constexpr Real kHeldBack = 0.5;
+    const bool held_back = law_.basis == Basis::analytic && law_.variance < kHeldBack * epsilon_ * loss;
     if (std::isfinite(loss) && !held_back)
       place(role, Kind::betting, side, limit);
     else if (trusted())
@@ -61,22 +63,28 @@ class Placing {
     const bool passes = role == Role::low || role == Role::high;
     const Real slack = law_.basis == Basis::pilot ? kPilotSlack : kind == Kind::betting ? 1 : passes ? kPassSlack : kFailSlack;
     Bet bet{kind, side, limit, law_.variance * slack, {}, 1};
-    const Real unit = epsilon_ / bet.variance, loss = lost(side, limit);
-    const Real most = kind == Kind::catoni ? kInfinity : loss > 0 ? kMostLost / loss : kInfinity;
-    std::vector<Real> rates;
+    const Real unit = epsilon_ / bet.variance, loss = kind == Kind::catoni ? 0 : std::max<Real>(0, lost(side, limit));
     if (passes) {
-      rates = {kPassRate * unit};
-    } else if (role == Role::beyond) {
-      for (const Real rate : kBeyondRates) rates.push_back(rate * unit);
-    } else {
-      // The best rate for a bias d is d/v, which earns d^2/2v an error.
-      const Real top = std::min(most, std::max(kMostPlannedRate * unit, std::sqrt(2 * kEvidence / (first_look_ * bet.variance))));
-      for (Real rate = kLeastFailRate * unit; rate < 1.41 * top; rate *= 2) rates.push_back(rate);
-      if (rates.empty()) rates.push_back(top);
+      // Of all laws of this variance the one of two values, -loss and near 0, loses most: for it l = d/(v + d loss) is best.
+      const Real rate = kPassRate * unit;
+      append(role, bet, {std::min(rate / (1 + rate * loss), loss > 0 ? kMostLost / loss : kInfinity)});
+      return;
     }
+    const Real most = loss > 0 ? kMostRisked / loss : kInfinity;
+    std::vector<Real> rates = role == Role::beyond ? std::vector{kBeyondRate * unit} : ladder(bet, unit);
     for (Real& rate : rates) rate = std::min(rate, most);
     rates.erase(std::unique(rates.begin(), rates.end()), rates.end());
     append(role, bet, rates);
+  }
+
+  /// Rates against "0".  The best one for a bias d is d/v, which earns d^2/2v an error.
+  std::vector<Real> ladder(const Bet& bet, Real unit) const {
+    constexpr Real kBetweenSteps = 1.41;
+    const Real seen_at_once = first_look_ > 0 ? std::sqrt(2 * kEvidence / (first_look_ * bet.variance)) : 0;
+    const Real top = std::max(kMostPlannedRate * unit, std::min(seen_at_once, most_for(bet, kShortestSum)));
+    std::vector<Real> rates;
+    for (Real rate = kLeastFailRate * unit; rate < kBetweenSteps * top; rate *= 2) rates.push_back(rate);
+    return rates;
   }
 
   /// Rates that may bet on sums of as many errors share a bet.
@@ -92,16 +100,17 @@ class Placing {
     }
   }
 
-  /// Sums may be as long as a bet still resembles the product over single errors.
-  int errors_per_sum(const Bet& bet, Real rate) const {
+  /// The highest rate at which a bet on sums of b errors still resembles the product over single ones.
+  Real most_for(const Bet& bet, int b) const {
     constexpr Real kSmall = 0.5;
+    if (bet.kind == Kind::catoni) return kSmall / std::sqrt(b * bet.variance);
     const auto finite = [](Real x) { return std::isfinite(x) ? x : 0; };
-    const Real widest = std::max(finite(law_.below), finite(law_.above)) + std::abs(bet.limit);
+    return kSmall / (b * (std::max(finite(law_.below), finite(law_.above)) + std::abs(bet.limit)));
+  }
+
+  int errors_per_sum(const Bet& bet, Real rate) const {
     int b = most_per_sum_;
-    const auto fits = [&] {
-      return bet.kind == Kind::catoni ? b * rate * rate * bet.variance <= kSmall * kSmall : b * rate * widest <= kSmall;
-    };
-    while (b > 1 && !fits()) b /= 2;
+    while (b > 1 && rate > most_for(bet, b)) b /= 2;
     return b;
   }
 
@@ -132,8 +141,12 @@ Real errors_to_pass(const std::vector<std::pair<Role, Bet>>& bets, const ErrorLa
     Real errors = kInfinity;
     for (const auto& [placed, bet] : bets) {
       if (placed != role) continue;
-      // log wealth has mean growth n and deviation l sqrt(v n).
-      const Real l = bet.rates.front(), growth = l * margin - l * l * bet.variance / 2;
+      // log wealth has mean growth n and deviation l sqrt(v n).  For the law that loses most, E log(1 - l e) is
+      // v (log(1 - r) + r) / loss^2, with r = l loss; of small r, and of Catoni's bet, -l^2 v/2.
+      const Real l = bet.rates.front(), loss = bet.side > 0 ? law.below + bet.limit : law.above - bet.limit, r = l * loss;
+      const bool small = bet.kind == Kind::catoni || !(r > 1e-3);
+      const Real lost = small ? l * l * bet.variance / 2 : -bet.variance * (std::log1p(-r) + r) / (loss * loss);
+      const Real growth = l * margin - lost;
       const Real swing = power * l * std::sqrt(law.variance), needed = -std::log(alpha_pass);
       if (!(growth > 0)) continue;
       const Real root = (swing + std::sqrt(swing * swing + 4 * growth * needed)) / (2 * growth);

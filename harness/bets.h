@@ -32,9 +32,10 @@ struct ErrorLaw {
 ///   low, high      betting where its side is bounded, else Catoni's; Catoni's too where the variance is so small,
 ///                  v < epsilon loss / 2, that betting would be held back by its bound alone
 ///
-/// Rates l, in units of epsilon/v: a PASS is planned for one, .69, which is best at the planned number of samples.  A bias may be
-/// of any size: rates against "0" double from .4 up to the one that the first look's samples make the best for the least bias
-/// that they could prove at all.  Then no bias earns less than .89 of what its best rate would.
+/// Rates l, in units of epsilon/v: a PASS is planned for one, .69, which is best at the planned number of samples, and less where
+/// it would risk too much at once.  A bias may be of any size: rates against "0" double from .4 up to what the first look makes
+/// the best for the least bias that it could prove at all, `first_look` errors.  No bias in between earns less than .89 of what its
+/// best rate would.  Without a first look (0) they end at 1.6.
 std::vector<std::pair<Role, Bet>> place_bets(const ErrorLaw& law, Real epsilon, std::uint64_t first_look, int most_per_sum);
 
 /// "betting", "catoni", "catoni+betting", or "none": what the bets rest on.

@@ -52,8 +52,6 @@ class Products {
   Integers exponent_{};
 };
 
-/// Sums that all bets are placed on before the next are read: they stay near.
-constexpr std::size_t kBlock = 2048;
 constexpr std::size_t kChains = 2;  // of factors, that do not wait for each other
 using Chains = std::array<Eight, kChains>;
 
@@ -105,7 +103,6 @@ class Wager {
     }
   }
 
-  /// At most kBlock sums.
   void place(std::span<const Real> sums) {
     if (calm_)
       count_ == 1 ? place<Calm, 1>(sums) : place<Calm, 2>(sums);
@@ -113,8 +110,8 @@ class Wager {
       count_ == 1 ? place<Wild, 1>(sums) : place<Wild, 2>(sums);
   }
 
-  void append_logs(std::vector<Real>& logs) const {
-    for (std::size_t r = 0; r < count_; ++r) logs.push_back(products_[r].log());
+  void add_logs(std::span<Real> logs) const {
+    for (std::size_t r = 0; r < count_; ++r) logs[r] += products_[r].log();
   }
 
  private:
@@ -198,22 +195,15 @@ std::pair<Real, Real> extent(std::span<const Real> x) {
 
 }  // namespace
 
-std::vector<Real> bet_on(std::span<const Bet* const> bets, std::span<const Real> sums) {
+void bet_on(const Bet& bet, std::span<const Real> sums, std::span<Real> logs) {
   const auto [least, most] = extent(sums);
-  std::vector<Wager> wagers;
-  for (const Bet* bet : bets)
-    for (std::size_t r = 0; r < bet->rates.size(); r += Wager::kRates)
-      wagers.emplace_back(*bet, std::span(bet->rates).subspan(r, std::min(Wager::kRates, bet->rates.size() - r)), least, most);
-  for (std::size_t i = 0; i < sums.size(); i += kBlock)
-    for (Wager& wager : wagers) wager.place(sums.subspan(i, std::min(kBlock, sums.size() - i)));
-  std::vector<Real> logs;
-  for (const Wager& wager : wagers) wager.append_logs(logs);
-  return logs;
-}
-
-std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums) {
-  const Bet* const one = &bet;
-  return bet_on(std::span(&one, 1), sums);
+  const std::span rates(bet.rates);
+  for (std::size_t r = 0; r < rates.size(); r += Wager::kRates) {
+    const std::size_t count = std::min(Wager::kRates, rates.size() - r);
+    Wager wager(bet, rates.subspan(r, count), least, most);
+    wager.place(sums);
+    wager.add_logs(logs.subspan(r, count));
+  }
 }
 
 Real log_denominator(const Bet& bet, Real rate, std::uint64_t sums) {

@@ -29,12 +29,9 @@ struct Bet {
   int errors_per_sum = 1;   ///< b
 };
 
-/// log of a bet's wealth at each of its rates, without Catoni's denominator, which depends on the number of sums alone: adding
-/// the logs of shards gives the log of the whole.
-std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums);
-
-/// The same for several bets on the same sums, one after the other.
-std::vector<Real> bet_on(std::span<const Bet* const> bets, std::span<const Real> sums);
+/// Adds to `logs`, one for each rate, what sums of `errors_per_sum` errors each add to the log of the bet's wealth; without
+/// Catoni's denominator, which depends on the number of sums alone: the logs of shards add up to the log of the whole.
+void bet_on(const Bet& bet, std::span<const Real> sums, std::span<Real> logs);
 
 /// log((1 + l^2 b v/2)^sums) of a Catoni bet at rate l; 0 for a betting one.
 Real log_denominator(const Bet& bet, Real rate, std::uint64_t sums);

@@ -74,7 +74,8 @@ struct Pool {
   std::size_t rays = 0;
 };
 
-/// Of an unbiased cell's tests together, beyond the planned chance of a test and where a decision is all but sure.
+/// Normal quantile of the chance at which a test is planned; the chance that a test of the whole configuration stays undecided
+/// where a decision counts as sure.
 constexpr Real kPlannedPower = 1.645, kUnsure = 1e-3;
 
 std::uint64_t per_ray(Real samples, std::size_t rays) {
@@ -118,27 +119,24 @@ std::vector<int> ray_groups(const BuiltRays& rays) {
   return groups;
 }
 
-std::vector<int> MeanTest::sum_lengths() const {
-  std::vector<int> lengths;
-  for (const auto& [role, bet] : bets) lengths.push_back(bet.errors_per_sum);
-  std::sort(lengths.begin(), lengths.end());
-  lengths.erase(std::unique(lengths.begin(), lengths.end()), lengths.end());
-  if (lengths.empty()) lengths.push_back(1);
-  return lengths;
+void MeanTest::place(std::vector<std::pair<Role, Bet>> placed) {
+  bets = std::move(placed);
+  basis = basis_of(bets);
+  sum_lengths.clear();
+  for (const auto& [role, bet] : bets) sum_lengths.push_back(bet.errors_per_sum);
+  std::sort(sum_lengths.begin(), sum_lengths.end());
+  sum_lengths.erase(std::unique(sum_lengths.begin(), sum_lengths.end()), sum_lengths.end());
+  if (sum_lengths.empty()) sum_lengths.push_back(1);
 }
 
 void Evidence::bet(const MeanTest& test, int errors_per_sum, std::span<const Real> sums) {
-  std::vector<const Bet*> bets;
-  for (const auto& placed : test.bets)
-    if (placed.second.errors_per_sum == errors_per_sum) bets.push_back(&placed.second);
-  const std::vector<Real> added = bet_on(bets, sums);
-  std::size_t at = 0, next = 0;
-  for (const auto& placed : test.bets) {
-    const std::size_t end = at + placed.second.rates.size();
-    if (logs.size() < end) logs.resize(end, 0);
-    if (placed.second.errors_per_sum == errors_per_sum)
-      for (; at < end; ++at) logs[at] += added[next++];
-    at = end;
+  std::size_t rates = 0;
+  for (const auto& [role, bet] : test.bets) rates += bet.rates.size();
+  logs.resize(rates, 0);
+  std::size_t at = 0;
+  for (const auto& [role, bet] : test.bets) {
+    if (bet.errors_per_sum == errors_per_sum) bet_on(bet, sums, std::span(logs).subspan(at, bet.rates.size()));
+    at += bet.rates.size();
   }
 }
 
@@ -157,7 +155,7 @@ namespace {
 class GatePlanner {
  public:
   GatePlanner(const Cell& cell, const Scene& scene, const Targets& targets, Claim claim, const CellTheory& theory,
-              const std::optional<Pilot>& pilot, const GateLevels& levels)
+              const std::optional<Pilot>& pilot, const TestLevels& levels)
       : cell_(cell), targets_(targets), theory_(theory), pilot_(pilot), levels_(levels), rays_(scene.rays->world.size()) {
     const bool own_mean = claim == Claim::consistent || claim == Claim::biased;
     gate_.against = own_mean ? "own mean" : "reference";
@@ -169,6 +167,7 @@ class GatePlanner {
     // A free path is drawn, whatever its law is known by.
     exact_ = claim == Claim::exact && cell.quantity != Quantity::free_path && cell.quantity != Quantity::radiance;
     most_per_sum_ = static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
+    gate_.longest_sum = static_cast<std::uint64_t>(most_per_sum_);
     mean_lookups_ =
         theory.lookups.value_or(pilot && pilot->samples > 0
                                     ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples)
@@ -265,15 +264,15 @@ class GatePlanner {
       test.basis = "deterministic";
       return;
     }
-    test.bets = place_bets(law, test.epsilon, cell_.samples_per_ray * test.rays, most_per_sum_);
-    test.basis = basis_of(test.bets);
+    // A bias far beyond epsilon shows in the mean of all rays, or it is one of some groups that the others hide.
+    const bool pooled = test.channel != MeanTest::kLookups && test.group == MeanTest::kAllRays;
+    test.place(place_bets(law, test.epsilon, pooled ? cell_.samples_per_ray * rays_ : 0, most_per_sum_));
     const auto needed = [&](Real power) {
       return per_ray(errors_to_pass(test.bets, law, test.epsilon, levels_.alpha_pass, power), test.rays);
     };
     test.planned = needed(kPlannedPower);
-    // The chance that all tests of the cell are decided is no less than 1 minus the sum of the others.
-    const Real all = static_cast<Real>(targets_.outputs) * static_cast<Real>(rays_ < kRayGroups ? 1 : 1 + kRayGroups);
-    test.sure = needed(boost::math::quantile(complement(boost::math::normal(), kUnsure / all)));
+    // The chance that all tests are decided is no less than 1 minus the sum of the others.
+    test.sure = needed(boost::math::quantile(complement(boost::math::normal(), kUnsure / static_cast<Real>(levels_.tests))));
   }
 
   /// What the test of a mean asks of the cell.
@@ -354,7 +353,7 @@ class GatePlanner {
   const Targets& targets_;
   const CellTheory& theory_;
   const std::optional<Pilot>& pilot_;
-  const GateLevels& levels_;
+  const TestLevels& levels_;
   std::size_t rays_;
   bool analytic_ = false, exact_ = false;
   int most_per_sum_ = 1;
@@ -367,7 +366,7 @@ class GatePlanner {
 }  // namespace
 
 CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Claim claim,
-                   const CellTheory& theory, const std::optional<Pilot>& pilot, const GateLevels& levels) {
+                   const CellTheory& theory, const std::optional<Pilot>& pilot, const TestLevels& levels) {
   return GatePlanner(cell, scene, targets, claim, theory, pilot, levels).plan(range, scene.bounding);
 }
 

@@ -40,11 +40,11 @@ struct MeanTest {
   std::string basis;           ///< see TestRecord
   Real reference = 0;          ///< expected mean, averaged over the rays
   std::uint64_t planned = 0;   ///< samples per ray at which the test of an unbiased mean passes with a chance of .95
-  std::uint64_t sure = 0;      ///< the same, where all tests of the cell together do with a chance of .999
-  std::vector<std::pair<Role, Bet>> bets;  ///< on sums of 2^i errors, which divide the samples of a ray
+  std::uint64_t sure = 0;      ///< the same, where all tests of the configuration together do with a chance of .999
+  std::vector<std::pair<Role, Bet>> bets;
+  std::vector<int> sum_lengths = {1};  ///< errors that share a sum, ascending: powers of two that divide the samples of a ray
 
-  /// How many errors share a sum, ascending; each divides the next.
-  std::vector<int> sum_lengths() const;
+  void place(std::vector<std::pair<Role, Bet>> placed);
 };
 
 /// What a cell's samples are judged by.
@@ -57,6 +57,7 @@ struct CellGate {
   Real low = -kInfinity, high = kInfinity;  ///< the declared range of samples
   std::string against;                      ///< "reference" or "own mean"
   std::string variance_basis;               ///< "analytic", "pilot" or "none"
+  std::uint64_t longest_sum = 1;            ///< what rounds of samples are multiples of: 1 to 64, a power of two
   std::uint64_t planned = 0;                ///< samples per ray, of the most demanding test of the mean
   std::uint64_t affordable = 0;             ///< samples per ray that the configuration allows
   std::uint64_t allowance = 0;              ///< samples per ray that an undecided cell may draw
@@ -84,10 +85,16 @@ struct Pilot {
   Real variance_of_variance = 0;           ///< largest over outputs of sum d^4/(sum d^2)^2 - 1/n
 };
 
+/// What tests are planned for.
+struct TestLevels {
+  Real alpha_pass = GateLevels{}.alpha_pass;
+  std::uint64_t tests = 1;  ///< of means, in the whole configuration
+};
+
 /// Plans the tests of a cell.  Where the majorant does not bound, ranges that rest on it are not claimed.  `pilot` serves where
 /// theory has no variance.
 CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Claim claim,
-                   const CellTheory& theory, const std::optional<Pilot>& pilot, const GateLevels& levels);
+                   const CellTheory& theory, const std::optional<Pilot>& pilot, const TestLevels& levels);
 
 /// The figures of a test, ready for the record.
 TestRecord test_record(const MeanTest& test, const Evidence& evidence);

@@ -232,7 +232,8 @@ class LawTester {
         const Real rate = 1 / std::sqrt(static_cast<Real>(y.size()) * list[0]);
         for (const int side : {-1, 1}) {
           const Bet bet{Bet::Kind::catoni, side, 0, 1.02 * list[0], {3 * rate, 7 * rate}, 1};
-          const std::vector<Real> won = bet_on(bet, y);
+          std::vector<Real> won(bet.rates.size());
+          bet_on(bet, y, won);
           for (std::size_t r = 0; r < won.size(); ++r) logs.push_back(won[r] - log_denominator(bet, bet.rates[r], y.size()));
         }
       }

@@ -130,7 +130,7 @@ bool is_judged(const PreparedCell& prepared) {
 }
 
 /// The tests of a cell; nothing for cells that claim nothing that could be tested.
-std::optional<CellGate> gate_of(PreparedCell& prepared, const GateLevels& levels, const std::function<bool()>& stop) {
+std::optional<CellGate> gate_of(PreparedCell& prepared, const TestLevels& levels, const std::function<bool()>& stop) {
   if (!is_judged(prepared)) return std::nullopt;
   const bool spread_missing = !prepared.theory.ray_lookups.empty() && prepared.theory.ray_lookups_variance.empty();
   std::optional<Pilot> pilot;
@@ -156,7 +156,8 @@ std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gat
   return laws;
 }
 
-/// Whether the samples' own spread says that their mean is off, though nothing could be bet on it; how, in words.
+/// Whether the samples' own spread says that their mean is off, by more than one sample of 1 that they have not shown could make
+/// up for, though nothing could be bet on it; how, in words.
 std::optional<std::string> far_off(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled) {
   constexpr Real kStandardErrors = 6;
   const std::size_t outputs = prepared.targets.outputs;
@@ -172,6 +173,8 @@ std::optional<std::string> far_off(const PreparedCell& prepared, const CellGate&
     for (const MeanTest& test : gate.tests)
       if (test.channel == static_cast<int>(o) && test.group == MeanTest::kAllRays) rounding = test.rounding + test.reference_error;
     if (std::abs(error) <= kStandardErrors * std::sqrt(squared) + rounding) continue;
+    if (std::abs(error) * static_cast<Real>(sampled.counters.samples) <= std::max({Real{1}, sampled.largest, std::abs(expected)}))
+      continue;
     const std::string errors =
         squared > 0 ? fmt::format("{:.3g} standard errors of the samples", std::abs(error) / std::sqrt(squared)) : "and no variance";
     return fmt::format("mean {:.6g}, expected {:.6g} ({:+.2g}, {})", expected + error, expected, error, errors);
@@ -230,9 +233,11 @@ class Judging {
     if (!open() || drawn >= gate_.allowance) return {};
     // As many again until the planned ones are drawn; then steps of a quarter overshoot by an eighth.
     const std::uint64_t wanted = drawn < gate_.planned ? std::min(drawn, gate_.planned - drawn) : drawn / 4;
-    constexpr std::uint64_t kRound = 64;
+    // Whole sums, and whole blocks of walks where there are many.
+    constexpr std::uint64_t kRound = 64, kMany = 1024;
+    const std::uint64_t round = drawn >= kMany ? kRound : gate_.longest_sum;
     const std::uint64_t count = std::clamp<std::uint64_t>(wanted, 1, gate_.allowance - drawn);
-    return {.first = drawn, .per_ray = (count + kRound - 1) / kRound * kRound, .only_evidence = true};
+    return {.first = drawn, .per_ray = (count + round - 1) / round * round, .only_evidence = true};
   }
 
   void add(const Sampled& more, std::uint64_t per_ray) {
@@ -294,7 +299,7 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
 }
 
 /// What the verdict of a cell can be expected to say, before anything is sampled.
-void foresee(const PreparedCell& prepared, const GateLevels& levels, Prediction& prediction) {
+void foresee(const PreparedCell& prepared, const TestLevels& levels, Prediction& prediction) {
   prediction.most = prepared.samples_per_ray;
   if (!is_judged(prepared)) {
     prediction.verdict = "not judged";
@@ -543,7 +548,7 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     return outcome;
   }
   const auto progress = [&](double fraction) { observer.progress(record, fraction); };
-  const std::optional<CellGate> gate = gate_of(prepared, plan.levels, stop);
+  const std::optional<CellGate> gate = gate_of(prepared, TestLevels{plan.levels.alpha_pass, families.means}, stop);
   const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
                                    {0, prepared.samples_per_ray}, gate ? &*gate : nullptr, stop, progress);
   if (sampled) outcome.effort += *sampled;
@@ -682,6 +687,7 @@ std::vector<Prediction> predict(const Plan& plan, const std::vector<bool>& selec
   std::vector<PreparedCell> cells = prepare_all(workshop, plan, [&](std::size_t i) { return selected[i]; });
   add_theory(cells);
   std::vector<Prediction> result;
+  const TestLevels levels{plan.levels.alpha_pass, mean_family(plan)};
   for (const PreparedCell& prepared : cells) {
     Prediction prediction;
     prediction.status = prepared.reason.empty() ? "ok" : prepared.reason;
@@ -697,7 +703,7 @@ std::vector<Prediction> predict(const Plan& plan, const std::vector<bool>& selec
       if (!prepared.theory.variance.empty() && prepared.theory.variance[0] && squares > 0)
         prediction.relative_variance = finite(*prepared.theory.variance[0] * static_cast<Real>(prediction.rays) / squares);
     }
-    if (prepared.scene && prepared.reason.empty()) foresee(prepared, plan.levels, prediction);
+    if (prepared.scene && prepared.reason.empty()) foresee(prepared, levels, prediction);
     result.push_back(prediction);
   }
   return result;

@@ -59,17 +59,24 @@ class Evidences {
   struct Memory {
     std::vector<std::vector<std::vector<Real>>> pending;  ///< by test and length of its sums
     std::vector<std::vector<Real>> sums;                  ///< by length
+
+    static Memory& of_this_thread() {
+      static thread_local Memory memory;
+      return memory;
+    }
   };
 
   Evidences(const CellGate* gate, std::size_t channels, Memory& memory, std::map<std::size_t, Evidence>& out)
       : gate_(gate), out_(out), pooled_(channels), grouped_(channels), pending_(memory.pending), sums_(memory.sums) {
     if (!gate_) return;
-    pending_.resize(gate_->tests.size());
+    pending_.resize(std::max(pending_.size(), gate_->tests.size()));
+    for (std::vector<std::vector<Real>>& lengths : pending_)
+      for (std::vector<Real>& waiting : lengths) waiting.clear();  // of a run that was stopped
     for (std::size_t i = 0; i < gate_->tests.size(); ++i) {
       const MeanTest& test = gate_->tests[i];
-      lengths_.push_back(test.sum_lengths());
-      pending_[i].resize(lengths_.back().size());
-      sums_.resize(std::max(sums_.size(), lengths_.back().size()));
+      const std::size_t lengths = test.sum_lengths.size();
+      pending_[i].resize(std::max(pending_[i].size(), lengths));
+      sums_.resize(std::max(sums_.size(), lengths));
       if (test.channel == MeanTest::kLookups) {
         lookups_ = i;
       } else if (test.group == MeanTest::kAllRays) {
@@ -104,8 +111,8 @@ class Evidences {
   }
 
   void finish() {
-    for (std::size_t test = 0; gate_ && test < pending_.size(); ++test)
-      for (std::size_t length = 0; length < pending_[test].size(); ++length) flush(test, length);
+    for (std::size_t test = 0; gate_ && test < gate_->tests.size(); ++test)
+      for (std::size_t length = 0; length < gate_->tests[test].sum_lengths.size(); ++length) flush(test, length);
   }
 
  private:
@@ -114,7 +121,7 @@ class Evidences {
   /// Every sum is one of those before it: the shortest of the numbers, less what is expected of each.
   template <class Number, class Largest>
   void add_to(std::size_t test, std::span<const Number> numbers, Real expected, Largest largest_error) {
-    const std::vector<int>& lengths = lengths_[test];
+    const std::vector<int>& lengths = gate_->tests[test].sum_lengths;
     std::span<const Real> sums = sum(numbers, lengths[0], expected * lengths[0], sums_[0]);
     feed(test, 0, sums);
     for (std::size_t i = 1; i < lengths.size(); ++i) {
@@ -158,7 +165,7 @@ class Evidences {
     if (gate_->tests[test].bets.empty()) return;
     std::vector<Real>& waiting = pending_[test][length];
     if (waiting.empty() && sums.size() >= kEnough) {
-      out_[test].bet(gate_->tests[test], lengths_[test][length], sums);
+      out_[test].bet(gate_->tests[test], gate_->tests[test].sum_lengths[length], sums);
       return;
     }
     waiting.insert(waiting.end(), sums.begin(), sums.end());
@@ -168,13 +175,12 @@ class Evidences {
   void flush(std::size_t test, std::size_t length) {
     std::vector<Real>& waiting = pending_[test][length];
     if (waiting.empty()) return;
-    out_[test].bet(gate_->tests[test], lengths_[test][length], waiting);
+    out_[test].bet(gate_->tests[test], gate_->tests[test].sum_lengths[length], waiting);
     waiting.clear();
   }
 
   const CellGate* gate_;
   std::map<std::size_t, Evidence>& out_;
-  std::vector<std::vector<int>> lengths_;                         // of sums, by test
   std::vector<std::optional<std::size_t>> pooled_;                // test by channel
   std::vector<std::vector<std::optional<std::size_t>>> grouped_;  // by channel and group
   std::optional<std::size_t> lookups_;
@@ -203,7 +209,6 @@ struct Scratch {
   RayContext context;
   SampleBlock block;
   std::vector<Real> errors, finite;
-  Evidences::Memory evidence;
 };
 
 /// Rounding allowed to samples at the ends of their declared range.
@@ -345,7 +350,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     out.blocks.resize(outputs);
     out.group_sums.assign(outputs, 0);
     const auto begun = Clock::now();
-    Evidences evidences(gate, outputs, mine.evidence, out.evidence);
+    Evidences evidences(gate, outputs, Evidences::Memory::of_this_thread(), out.evidence);
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
       scene.context(ray, kernel, mine.context);
       kernel.begin_ray(*mine.workspace, *scene.medium->medium, scene.medium->extrema, mine.context);

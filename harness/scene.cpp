@@ -186,6 +186,20 @@ DepthWithError optical_depth(const Medium& medium, const Ray& local) {
   return {depth, error, "quadrature"};
 }
 
+namespace {
+
+/// What the rounding of points on a ray may add to its optical depth, per channel: a point is told to a unit in the last place of
+/// its coordinates, and so are the ends of pieces.
+Spectrum position_error(const BuiltMedium& medium, const Ray& world, const Ray& local) {
+  if (!(local.length() > 0)) return Spectrum::Zero(medium.medium->channels());
+  const Real coordinates = std::max(local.at(local.begin).cwiseAbs().maxCoeff(), local.at(local.end).cwiseAbs().maxCoeff());
+  const Real origin = local.origin.cwiseAbs().maxCoeff();
+  const Real lengths = std::max({std::max(coordinates, origin) / local.direction.norm(), std::abs(world.begin), std::abs(world.end)});
+  return 4 * kEpsilon * lengths * medium.extrema.maximum;
+}
+
+}  // namespace
+
 Reference compute_reference(const BuiltMedium& medium, const BuiltRays& rays) {
   Reference reference;
   reference.channels = medium.medium->channels();
@@ -196,9 +210,10 @@ Reference compute_reference(const BuiltMedium& medium, const BuiltRays& rays) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.local.size(), 16), [&](const auto& range) {
     for (std::size_t r = range.begin(); r < range.end(); ++r) {
       const DepthWithError result = optical_depth(*medium.medium, rays.local[r]);
+      const Spectrum error = result.error + position_error(medium, rays.world[r], rays.local[r]);
       for (std::size_t c = 0; c < channels; ++c) {
         reference.depth[r * channels + c] = result.depth[static_cast<Eigen::Index>(c)];
-        reference.error[r * channels + c] = result.error[static_cast<Eigen::Index>(c)];
+        reference.error[r * channels + c] = error[static_cast<Eigen::Index>(c)];
       }
       method[r] = result.method;
     }
@@ -231,7 +246,7 @@ Marks compute_marks(const BuiltMedium& medium, const BuiltRays& rays, Quantity q
       else
         place_equally_probable(*medium.medium, local, {distance, marks.per_ray});
       Ray part = local;
-      Spectrum depth = Spectrum::Zero(medium.medium->channels()), error = depth;
+      Spectrum depth = Spectrum::Zero(medium.medium->channels()), error = position_error(medium, rays.world[r], local);
       for (std::size_t j = 0; j < marks.per_ray; ++j) {
         part.end = distance[j];
         const DepthWithError added = optical_depth(*medium.medium, part);

@@ -84,6 +84,7 @@ void free_path_targets(const MarkedTransmittance& marked, const Spectrum& albedo
 
 /// Throws ParameterError where what is given contradicts what is known.
 void take_given(Targets& targets, const GivenReference& given) {
+  bool taken = false;
   if (given.value.size() != 1 && given.value.size() != targets.outputs)
     throw ParameterError("reference", fmt::format("found {} values; expected 1, or {}, as many as a sample has numbers",
                                                   given.value.size(), targets.outputs));
@@ -93,10 +94,14 @@ void take_given(Targets& targets, const GivenReference& given) {
     if (std::isfinite(known) && std::abs(value - known) > std::abs(value) * given.error + targets.error[i] + kRounding)
       throw ParameterError("reference", fmt::format("found {} ({}); the mean is known here, {:.9g} by {}", value, given.source,
                                                     known, targets.method));
+    // What is known here with a smaller error stays; what is given has confirmed it.
+    const Real error = std::abs(value) * given.error;
+    if (std::isfinite(known) && targets.error[i] <= std::max(error, kRounding)) continue;
     targets.mean[i] = value;
-    targets.error[i] = std::abs(value) * given.error;
+    targets.error[i] = error;
+    taken = true;
   }
-  targets.method = "given: " + given.source;
+  if (taken) targets.method = "given: " + given.source;
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ auto located(const std::string& pointer, F&& f) {
 /// Flights in float are told to 2^-24 of the ray's depth: here still a thousandth of a mean free path.
 constexpr Real kDeepestSingle = 1 << 14;
 /// Of a medium from its frame's origin, in its own sizes: its inside is still told to 2^-14.
-constexpr Real kFarthestSingle = 1 << 10;
+constexpr Real kFarthestSingle = 1 << 10, kFarthestDouble = 0x1p39;
 
 template <class Key, class Value, class Make>
 std::shared_ptr<const Value> once(std::map<Key, std::shared_ptr<const Value>>& cache, const Key& key, Make&& make) {
@@ -105,11 +105,12 @@ std::string Workshop::why_not(const Cell& cell, const Scene& scene, const Kernel
                        cell.precision == Precision::float32 ? " in float" : "");
   const bool single = cell.precision == Precision::float32;
   const Box box = scene.medium->medium->bounds();
-  if (single && box.lo.cwiseAbs().cwiseMax(box.hi.cwiseAbs()).maxCoeff() > kFarthestSingle * box.extent().minCoeff())
+  const Real farthest = single ? kFarthestSingle : kFarthestDouble;
+  if (box.lo.cwiseAbs().cwiseMax(box.hi.cwiseAbs()).maxCoeff() > farthest * box.extent().minCoeff())
     return fmt::format(
-        "the medium lies over {} times its size from the origin of its frame, where float has no digits for a "
-        "position; expected it nearer, or \"double\"",
-        kFarthestSingle);
+        "the medium lies over {:g} times its size from the origin of its frame, where {} has no digits for a position; expected it "
+        "nearer{}",
+        farthest, single ? "float" : "double", single ? ", or \"double\"" : "");
   if (const Real depth = single ? deepest_majorant(scene) : 0; depth > kDeepestSingle)
     return fmt::format("rays of majorant depth {:.6g} leave float no digits for a flight; expected at most {}, or \"double\"",
                        depth, kDeepestSingle);
