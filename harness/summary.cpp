@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 
 #include "harness/findings_text.h"
 #include "harness/json_input.h"
@@ -13,79 +14,28 @@
 #include "harness/verdict.h"
 #include "harness/verdict_json.h"
 
+#include "harness/words.h"
 namespace nullmark {
-
 namespace {
 
-/// What a cell amounts to, as one word.
-enum class Kind { pass, fail, expected_open, unexpected_open, violated, error, not_run, unclaimed };
-
-Kind kind_of(const CellRecord& record) {
-  if (record.status == Status::error) return Kind::error;
-  if (record.status != Status::ok) return Kind::not_run;
-  if (!record.verdict) return Kind::unclaimed;
-  const VerdictRecord& verdict = *record.verdict;
-  const Outcome mean = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
-  if (mean == Outcome::fail || verdict.lookups == Outcome::fail || verdict.lawful == Outcome::fail) return Kind::fail;
-  if (mean == Outcome::violated) return Kind::violated;
-  if (mean == Outcome::inconclusive) return verdict.planned_undecidable ? Kind::expected_open : Kind::unexpected_open;
-  return mean == Outcome::pass ? Kind::pass : Kind::unclaimed;
+/// How many cells of a kind have each mark: " (3 by pilot, 1 own mean)"; empty where none has one.
+std::string marks_among(const RunRecord& run, Kind kind) {
+  std::map<Mark, std::size_t> counts;
+  for (const CellRecord& record : run.cells)
+    if (kind_of(record) == kind)
+      for (const Mark mark : marks_of(record)) ++counts[mark];
+  std::string text;
+  for (const auto& [mark, count] : counts) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, mark_name(mark));
+  return text.empty() ? "" : fmt::format(" ({})", text);
 }
 
-const char* word(Kind kind) {
-  switch (kind) {
-    case Kind::pass:
-      return "PASS";
-    case Kind::fail:
-      return "FAIL";
-    case Kind::expected_open:
-      return "INCONCLUSIVE (as planned)";
-    case Kind::unexpected_open:
-      return "INCONCLUSIVE";
-    case Kind::violated:
-      return "VIOLATED";
-    case Kind::error:
-      return "ERROR";
-    case Kind::not_run:
-      return "not run";
-    case Kind::unclaimed:
-      break;
-  }
-  return "nothing claimed";
-}
-
-std::string violations_of(const CellRecord& record) {
-  const std::string largest =
-      record.largest_violation ? fmt::format(", the largest {:.3g} times it", *record.largest_violation) : "";
-  return fmt::format("{} of {} lookups above the bound{}", record.majorant_violations, record.lookups, largest);
-}
-
-}  // namespace
-
-std::string reason_of(const CellRecord& record) {
-  if (record.status != Status::ok) return record.reason;
-  if (!record.verdict) return "";
-  const VerdictRecord& verdict = *record.verdict;
-  std::string reason = verdict.reason;
-  if (verdict.violated) reason += fmt::format("{}{}", reason.empty() ? "" : ": ", violations_of(record));
-  if (verdict.lookups == Outcome::fail) {
-    for (const TestRecord& test : verdict.tests)
-      if (test.channel < 0)
-        reason +=
-            fmt::format("{}lookups differ from their expectation (log E = {:.1f})", reason.empty() ? "" : "; ", test.log_e_fail);
-  }
-  for (const LawRecord& law : verdict.laws)
-    if (law.outcome == Outcome::fail)
-      reason += fmt::format("{}law \"{}\" is broken (log E = {:.1f})", reason.empty() ? "" : "; ", law.name, law.log_e);
-  return reason;
-}
-
-namespace {
-
-std::string counts(const Summary& s) {
+std::string counts(const RunRecord& run, const Summary& s) {
   return fmt::format(
-      "{} PASS, {} FAIL, {} INCONCLUSIVE as planned, {} INCONCLUSIVE, {} VIOLATED, {} errors, {} not run, {} claim nothing",
-      s.pass, s.fail, s.expected_open, s.unexpected_open, s.violated, s.errors, s.not_run, s.unclaimed);
+      "{} PASS{}, {} FAIL{}, {} INCONCLUSIVE as planned{}, {} INCONCLUSIVE{}, {} VIOLATED, {} errors, {} not run, {} claim "
+      "nothing",
+      s.pass, marks_among(run, Kind::pass), s.fail, marks_among(run, Kind::fail), s.expected_open,
+      marks_among(run, Kind::expected_open), s.unexpected_open, marks_among(run, Kind::unexpected_open), s.violated, s.errors,
+      s.not_run, s.unclaimed);
 }
 
 std::string order_line(const OrderFit& fit) {
@@ -128,8 +78,6 @@ std::string families(const RunRecord& run) {
 }
 
 }  // namespace
-
-std::string verdict_word(const CellRecord& record) { return word(kind_of(record)); }
 
 Summary summarise(RunRecord& run) {
   Summary summary;
@@ -192,9 +140,11 @@ Summary summarise(RunRecord& run) {
 
 std::string summary_text(const RunRecord& run, const Summary& summary) {
   std::string text;
-  for (const Kind kind : {Kind::violated, Kind::expected_open, Kind::not_run, Kind::unexpected_open, Kind::error, Kind::fail})
+  for (const Kind kind :
+       {Kind::pass, Kind::violated, Kind::expected_open, Kind::not_run, Kind::unexpected_open, Kind::error, Kind::fail})
     for (const CellRecord& record : run.cells)
-      if (kind_of(record) == kind) text += fmt::format("{}: {}: {}\n", word(kind), record.cell.name, reason_of(record));
+      if (kind_of(record) == kind && (kind != Kind::pass || !marks_of(record).empty()))
+        text += fmt::format("{}: {}: {}\n", marked_word(record), record.cell.name, finding_of(record));
   for (const OrderFit& fit : summary.orders) text += fmt::format("ORDER: {}\n", order_line(fit));
   for (const Expectation& one : summary.expectations)
     if (!one.met) text += fmt::format("{}: {}\n", one.measured ? "EXPECTED OTHERWISE" : "NOT MEASURED", expectation_line(one));
@@ -203,17 +153,18 @@ std::string summary_text(const RunRecord& run, const Summary& summary) {
   if (!summary.findings.empty()) text += findings_text(summary.findings);
   if (summary.never_started > 0) text += fmt::format("{} cells of the configuration were never started\n", summary.never_started);
   if (summary.altered > 0) text += fmt::format("{} verdicts in the file are not what its figures say\n", summary.altered);
-  return text + fmt::format("{}\n{}\n", counts(summary), families(run));
+  return text + fmt::format("{}\n{}\n", counts(run, summary), families(run));
 }
 
 std::string summary_markdown(const RunRecord& run, const Summary& summary, const std::string& file) {
-  std::string text = fmt::format("### nullmark check: {}\n\n{}; {}.\n", run.name, counts(summary), families(run));
+  std::string text = fmt::format("### nullmark check: {}\n\n{}; {}.\n", run.name, counts(run, summary), families(run));
   const auto table = [&](std::initializer_list<Kind> kinds, const std::string& title, bool commands) {
     std::string rows;
     std::size_t count = 0;
     for (const CellRecord& record : run.cells)
-      if (std::find(kinds.begin(), kinds.end(), kind_of(record)) != kinds.end()) {
-        rows += fmt::format("| {} | {} | {} |\n", word(kind_of(record)), escaped(record.cell.name), escaped(reason_of(record)));
+      if (std::find(kinds.begin(), kinds.end(), kind_of(record)) != kinds.end() &&
+          (kind_of(record) != Kind::pass || !marks_of(record).empty())) {
+        rows += fmt::format("| {} | {} | {} |\n", marked_word(record), escaped(record.cell.name), escaped(finding_of(record)));
         if (commands) rows += fmt::format("| | | `{}` |\n", reproduction(record, file));
         ++count;
       }
@@ -240,3 +191,4 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
 }
 
 }  // namespace nullmark
+  table({Kind::pass}, "Passed, with a mark", false);

@@ -26,13 +26,7 @@ struct Summary {
 /// cells never started, or neither a cell that passed nor a claim that is decided 77; else 0.
 Summary summarise(RunRecord& run);
 
-/// The word that `check` counts a cell by: "PASS", "INCONCLUSIVE (as planned)".
-std::string verdict_word(const CellRecord& record);
-
-/// Why a cell is not PASS: of its status, its verdict, lookups above the bound and laws.
-std::string reason_of(const CellRecord& record);
-
-/// For the terminal: counts, then every cell that did not pass with its reason.
+/// For the terminal: every cell that did not pass or has a mark, with its reason or what it proves, then counts.
 std::string summary_text(const RunRecord& run, const Summary& summary);
 
 /// The same for a pull request.
