@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 
+#include "harness/cell_names.h"
 #include "harness/findings_text.h"
 #include "harness/json_input.h"
 #include "harness/junit.h"
@@ -13,8 +14,8 @@
 #include "harness/table.h"
 #include "harness/verdict.h"
 #include "harness/verdict_json.h"
-
 #include "harness/words.h"
+
 namespace nullmark {
 namespace {
 
@@ -55,6 +56,49 @@ std::size_t configured_cells(const RunRecord& run, const std::function<bool(cons
   return cells;
 }
 
+/// The cells that a filter left of the configuration, as the run says.
+std::optional<std::size_t> selected_cells(const RunRecord& run) {
+  const auto at = run.provenance.find("selected");
+  if (at == run.provenance.end()) return std::nullopt;
+  const Json selected = Json::parse(at->second, nullptr, false);
+  return selected.is_number_unsigned() ? std::optional(selected.get<std::size_t>()) : std::nullopt;
+}
+
+bool claims_a_mean(const CellRecord& record) {
+  return record.claims == "exact" || record.claims == "unbiased" || record.claims == "consistent";
+}
+
+std::size_t undecided_claims(const RunRecord& run) {
+  return static_cast<std::size_t>(std::count_if(run.cells.begin(), run.cells.end(), [](const CellRecord& record) {
+    const Kind kind = kind_of(record);
+    return claims_a_mean(record) &&
+           (kind == Kind::expected_open || kind == Kind::unexpected_open || kind == Kind::violated || kind == Kind::not_run);
+  }));
+}
+
+/// See Summary::undecided_trackers, in the order of their first cells.
+std::vector<std::string> undecided_trackers(const RunRecord& run) {
+  struct Tracker {
+    std::string name, claims;
+    bool judged = false, decided = false;
+  };
+  std::vector<Tracker> trackers;
+  for (const CellRecord& record : run.cells) {
+    if (!claims_a_mean(record) || record.status != Status::ok || !record.verdict) continue;
+    const Outcome mean = mean_of(*record.verdict);
+    const std::string name = tracker_label(record.cell);
+    auto at = std::find_if(trackers.begin(), trackers.end(), [&](const Tracker& tracker) { return tracker.name == name; });
+    if (at == trackers.end()) at = trackers.insert(at, {name, record.claims});
+    at->judged |= mean != Outcome::none;
+    at->decided |= mean == Outcome::pass || mean == Outcome::fail;
+  }
+  std::vector<std::string> lines;
+  for (const Tracker& tracker : trackers)
+    if (tracker.judged && !tracker.decided)
+      lines.push_back(fmt::format("{} claims {} and no cell decides it", tracker.name, tracker.claims));
+  return lines;
+}
+
 bool disables_verdict(const Json& cell) {
   if (!cell.is_object() || !cell.contains("gate")) return false;
   const Json& gate = cell["gate"];
@@ -65,6 +109,34 @@ std::size_t met(const std::vector<Expectation>& all) {
   return static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [](const Expectation& one) { return one.met; }));
 }
 
+/// ": 3 because no ray meets any extinction: nothing was tested"; empty where no cell says why.
+std::string reasons_of_unclaimed(const RunRecord& run) {
+  std::map<std::string, std::size_t> reasons;
+  for (const CellRecord& record : run.cells)
+    if (kind_of(record) == Kind::unclaimed && !record.reason.empty()) ++reasons[record.reason];
+  std::string text;
+  for (const auto& [reason, count] : reasons) text += fmt::format("{} {} ({})", text.empty() ? ":" : ";", reason, count);
+  return text;
+}
+
+/// What keeps a run whose cells are good from being a success, and what was left out on purpose.
+std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary) {
+  std::vector<std::string> lines;
+  if (summary.selected < summary.configured) {
+    const auto filter = run.provenance.find("filter");
+    lines.push_back(fmt::format("{} of the configuration's {} cells were selected{}", summary.selected, summary.configured,
+                                filter == run.provenance.end() ? "" : fmt::format(" by --filter {}", filter->second)));
+  }
+  if (summary.never_started > 0)
+    lines.push_back(fmt::format("{} cells of the configuration were never started", summary.never_started));
+  if (summary.altered > 0) lines.push_back(fmt::format("{} verdicts in the file are not what its figures say", summary.altered));
+  lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());
+  if (!summary.nothing_proven.empty()) lines.push_back(summary.nothing_proven);
+  if (summary.strict && summary.undecided_claims > 0)
+    lines.push_back(fmt::format("--strict: {} cells that claim something are not decided", summary.undecided_claims));
+  return lines;
+}
+
 std::string families(const RunRecord& run) {
   for (const CellRecord& record : run.cells)
     if (record.verdict)
@@ -72,15 +144,16 @@ std::string families(const RunRecord& run) {
           "at most {:g} of all runs show even one false FAIL among {} mean tests (and the same among {} of lookups)",
           record.verdict->alpha, record.verdict->family, record.verdict->lookups_family);
   const std::size_t off = configured_cells(run, disables_verdict), cells = run.cells.size();
-  if (off == 0) return "no cell was judged";
+  if (off == 0) return "no cell was judged" + reasons_of_unclaimed(run);
   return fmt::format("no cell was judged: the configuration disables the verdict in {} cells",
                      off == cells ? fmt::format("all {}", cells) : fmt::format("{} of {}", off, cells));
 }
 
 }  // namespace
 
-Summary summarise(RunRecord& run) {
+Summary summarise(RunRecord& run, bool strict) {
   Summary summary;
+  summary.strict = strict;
   for (CellRecord& record : run.cells) {
     if (record.verdict && record.status == Status::ok) {
       const VerdictRecord before = *record.verdict;
@@ -92,6 +165,7 @@ Summary summarise(RunRecord& run) {
     switch (kind_of(record)) {
       case Kind::pass:
         ++summary.pass;
+        summary.own_mean += record.verdict->against == "own mean";
         break;
       case Kind::fail:
         ++summary.fail;
@@ -116,24 +190,32 @@ Summary summarise(RunRecord& run) {
     }
   }
   for (const CellRecord& record : run.cells) summary.never_started += record.status == Status::not_run;
-  const std::size_t configured = configured_cells(run, [](const Json&) { return true; });
-  if (configured > run.cells.size()) summary.never_started += configured - run.cells.size();
+  summary.configured = configured_cells(run, [](const Json&) { return true; });
+  summary.selected = selected_cells(run).value_or(summary.configured);
+  if (summary.selected > run.cells.size()) summary.never_started += summary.selected - run.cells.size();
+  summary.undecided_claims = undecided_claims(run);
+  summary.undecided_trackers = undecided_trackers(run);
   summary.orders = fit_orders(run.cells);
   const bool order_failed =
       std::any_of(summary.orders.begin(), summary.orders.end(), [](const OrderFit& fit) { return fit.outcome == Outcome::fail; });
+  const bool order_passed =
+      std::any_of(summary.orders.begin(), summary.orders.end(), [](const OrderFit& fit) { return fit.outcome == Outcome::pass; });
   summary.expectations = expectations(run);
   summary.findings = findings(run);
   const bool disappointed = std::any_of(summary.expectations.begin(), summary.expectations.end(),
                                         [](const Expectation& one) { return one.measured && !one.met; });
   const bool told = std::any_of(summary.findings.begin(), summary.findings.end(),
                                 [](const ClaimFinding& one) { return one.outcome != ClaimOutcome::cannot_tell; });
+  if (summary.pass > 0 && summary.pass == summary.own_mean && !order_passed && !told)
+    summary.nothing_proven = "no cell proves anything about the quantity itself: only own means passed";
   if (summary.fail > 0 || order_failed || disappointed)
     summary.exit = ExitCode::bias_proven;
   else if (summary.errors > 0 || summary.altered > 0)
     summary.exit = ExitCode::internal_error;
   else if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0 && !told)
     summary.exit = ExitCode::nothing_ran;
-  else if (summary.never_started > 0 || summary.unexpected_open > 0 || (summary.pass == 0 && !told))
+  else if (summary.never_started > 0 || summary.unexpected_open > 0 || (summary.pass == 0 && !told) ||
+           !summary.nothing_proven.empty() || !summary.undecided_trackers.empty() || (strict && summary.undecided_claims > 0))
     summary.exit = ExitCode::inconclusive;
   return summary;
 }
@@ -151,13 +233,13 @@ std::string summary_text(const RunRecord& run, const Summary& summary) {
   if (!summary.expectations.empty())
     text += fmt::format("{} of {} expected numbers met\n", met(summary.expectations), summary.expectations.size());
   if (!summary.findings.empty()) text += findings_text(summary.findings);
-  if (summary.never_started > 0) text += fmt::format("{} cells of the configuration were never started\n", summary.never_started);
-  if (summary.altered > 0) text += fmt::format("{} verdicts in the file are not what its figures say\n", summary.altered);
+  for (const std::string& line : remarks_of(run, summary)) text += line + "\n";
   return text + fmt::format("{}\n{}\n", counts(run, summary), families(run));
 }
 
 std::string summary_markdown(const RunRecord& run, const Summary& summary, const std::string& file) {
   std::string text = fmt::format("### nullmark check: {}\n\n{}; {}.\n", run.name, counts(run, summary), families(run));
+  for (const std::string& line : remarks_of(run, summary)) text += fmt::format("- {}\n", escaped(line));
   const auto table = [&](std::initializer_list<Kind> kinds, const std::string& title, bool commands) {
     std::string rows;
     std::size_t count = 0;
@@ -177,6 +259,7 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
   table({Kind::unexpected_open}, "Undecided", false);
   table({Kind::expected_open}, "Undecidable by their mean, as planned", false);
   table({Kind::violated}, "Need a true majorant and did not have one", false);
+  table({Kind::pass}, "Passed, with a mark", false);
   if (!summary.expectations.empty()) {
     text += fmt::format("\n{} of {} expected numbers met.\n", met(summary.expectations), summary.expectations.size());
     for (const Expectation& one : summary.expectations)
@@ -191,4 +274,3 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
 }
 
 }  // namespace nullmark
-  table({Kind::pass}, "Passed, with a mark", false);
