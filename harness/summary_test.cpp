@@ -66,6 +66,7 @@ TEST(SummaryOfTrackers, EachThatClaimsMustBeDecidedSomewhere) {
   // Laws that hold decide no mean.
   CellRecord lawful = other;
   lawful.verdict->laws = {{"independence", 0, 100, Outcome::none}};
+  decide(*lawful.verdict);
   EXPECT_EQ(summary_of({good, lawful}).exit, ExitCode::inconclusive);
   EXPECT_EQ(summary_of({good, of_tracker(violated(), "delta")}).undecided_trackers,
             std::vector<std::string>{"delta claims unbiased and no cell decides it"});
