@@ -93,6 +93,7 @@ TEST(Words, WhatHasNoVerdictOnTheMeanHasNoMarks) {
 
 TEST(Words, AFindingIsWhatAPassProvesAndWhyOthersAreNone) {
   EXPECT_EQ(finding_of(passed()), "|bias| < 2 % of the mean");
+  EXPECT_EQ(finding_of(passed_by_own_mean()), "|mean - own mean| < 2 % of the mean");
   EXPECT_EQ(finding_of(failed()), "mean 0.49, expected 0.5: -2 %; biased, proven (log E 100.0 > 9.2)");
   EXPECT_EQ(finding_of(open()), "undecided after 1000 samples a ray; 800 were planned");
   EXPECT_EQ(finding_of(unjudged("no reference")), "no reference");
