@@ -174,7 +174,7 @@ class CommandLine {
     CLI::App* command = add("check", "Verdicts on bias and expected lookups, derived from the results file alone", [this] {
       refuse_overwriting({file_}, {junit_, markdown_});
       RunRecord run = load_all({file_})[0];
-      const Summary summary = summarise(run);
+      const Summary summary = summarise(run, strict_);
       if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
       warn(file_, version_remark(run));
       warn(file_, busy_remark(run));
@@ -189,6 +189,7 @@ class CommandLine {
     command->add_flag(
         "--cases", cases_,
         "Also show per experiment and tracker what was finite, the largest sample, the worst error, the guards that fired");
+    command->add_flag("--strict", strict_, "Exit code 77 where any cell that claims something is not decided");
     command->add_option("--junit", junit_, "Also write a JUnit report");
     command->add_option("--markdown", markdown_, "Also write a summary for a pull request");
   }
@@ -264,7 +265,8 @@ class CommandLine {
     CLI::App* command = add("export", "Write results in another program's format", [this] {
       expect_one_of(format_, export_formats(), "format");
       refuse_overwriting({file_}, {output_});
-      const RunRecord run = load_all({file_})[0];
+      RunRecord run = load_all({file_})[0];
+      summarise(run);
       deliver(export_results(run, format_, file_), output_);
       return ExitCode::ok;
     });
@@ -309,7 +311,7 @@ class CommandLine {
   ProceduralVdb volume_;
   std::vector<std::string> files_;
   std::string file_, baseline_, schema_, format_, output_, junit_, markdown_;
-  bool force_ = false, paired_ = false, cases_ = false;
+  bool force_ = false, paired_ = false, cases_ = false, strict_ = false;
 };
 
 /// Cells of two trackers of one name could not be told apart.

@@ -78,17 +78,25 @@ Shard requested_shard(const std::string& text) {
   throw InputError(fmt::format("--shard: found \"{}\"; expected K/N with 1 <= K <= N, as in 2/4", text));
 }
 
-std::vector<bool> select_cells(const Plan& plan, const RunCommand& command) {
-  const Shard shard = requested_shard(command.shard);
+/// The cells of a plan that `--filter` picks.
+std::vector<bool> filtered(const Plan& plan, const RunCommand& command) {
   std::regex pattern;
   try {
     pattern = std::regex(command.filter);
   } catch (const std::regex_error& error) {
     throw InputError(fmt::format("--filter: found \"{}\"; expected a regular expression: {}", command.filter, error.what()));
   }
-  std::vector<bool> selected(plan.cells.size());
+  std::vector<bool> wanted(plan.cells.size());
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
-    selected[i] = i % shard.count == shard.index && (command.filter.empty() || std::regex_search(plan.cells[i].name, pattern));
+    wanted[i] = command.filter.empty() || std::regex_search(plan.cells[i].name, pattern);
+  return wanted;
+}
+
+/// Those of the wanted cells that are of the shard.
+std::vector<bool> of_shard(const std::vector<bool>& wanted, const RunCommand& command) {
+  const Shard shard = requested_shard(command.shard);
+  std::vector<bool> selected = wanted;
+  for (std::size_t i = 0; i < selected.size(); ++i) selected[i] = wanted[i] && i % shard.count == shard.index;
   return selected;
 }
 
@@ -233,6 +241,8 @@ std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vect
 RunContext context_of(const RunCommand& command, const Plan& plan) {
   RunContext context;
   context.command_line = command.command_line;
+  context.filter = command.filter;
+  context.shard = command.shard;
   context.threads = command.threads > 0 ? command.threads : static_cast<int>(std::thread::hardware_concurrency());
   std::set<std::uint64_t> seeds;
   for (const Cell& cell : plan.cells) seeds.insert(cell.seed);
@@ -261,7 +271,7 @@ ExitCode run_command(const RunCommand& command) {
   const std::vector<ConfigSource> sources = load_configs(command.configs);
   const std::optional<std::uint64_t> seed = requested_seed(command.seed);
   const Plan plan = read_configs(sources, seed);
-  const std::vector<bool> selected = select_cells(plan, command);
+  const std::vector<bool> wanted = filtered(plan, command), selected = of_shard(wanted, command);
   const auto count = static_cast<std::size_t>(std::count(selected.begin(), selected.end(), true));
   if (count == 0) {
     fmt::print(stderr, "nullmark: nothing selected: none of {} cells passes --filter and --shard\n", plan.cells.size());
@@ -280,6 +290,9 @@ ExitCode run_command(const RunCommand& command) {
   }
   RunContext context = context_of(command, plan);
   const RunOptions options = options_of(command, to_stdout ? "" : output);
+
+  // What was there before was selected then.
+  for (std::size_t i = 0; i < plan.cells.size(); ++i) context.selected += wanted[i] || earlier.contains(i);
 
   std::vector<CellRecord> finished;
   for (const auto& [place, record] : earlier)

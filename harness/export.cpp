@@ -1,11 +1,13 @@
 #include "harness/export.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "harness/junit.h"
 #include "harness/metrics.h"
 #include "harness/names.h"
 #include "harness/results_json.h"
+#include "harness/words.h"
 
 namespace nullmark {
 namespace {
@@ -120,7 +122,10 @@ Row csv_row(const CellRecord& record, std::size_t c) {
           {"ns_per_sample", csv_number(metric(record, "ns_per_sample"))},
           {"ns_per_lookup", csv_number(metric(record, "ns_per_lookup"))},
           {"variance_x_lookups", csv_number(sampled ? variance_x_lookups(record, c) : std::nullopt)},
-          {"variance_x_ns", csv_number(sampled ? variance_x_ns(record, c) : std::nullopt)}};
+          {"variance_x_ns", csv_number(sampled ? variance_x_ns(record, c) : std::nullopt)},
+          {"verdict", verdict_word(kind_of(record))},
+          {"marks", fmt::format("{}", fmt::join(mark_texts(record), ", "))},
+          {"finding", finding_of(record)}};
 }
 
 std::string csv(const RunRecord& run) {
@@ -138,7 +143,13 @@ std::string csv(const RunRecord& run) {
 
 std::string jsonl(const RunRecord& run) {
   std::string text;
-  for (const CellRecord& record : run.cells) text += cell_json(record).dump() + "\n";
+  for (const CellRecord& record : run.cells) {
+    Json json = cell_json(record);
+    json["word"] = verdict_word(kind_of(record));
+    json["marks"] = mark_texts(record);
+    json["finding"] = finding_of(record);
+    text += json.dump() + "\n";
+  }
   return text;
 }
 

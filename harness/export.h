@@ -14,8 +14,8 @@ const std::vector<std::string>& export_formats();
 ///
 ///   google-benchmark  one row per timed repetition, names estimator/medium/param:value; for compare.py
 ///   csv               one row per cell and channel, RFC 4180
-///   jsonl             one cell of the results file per line
-///   junit             one test case per cell: errors are <error>, skipped and not started cells are <skipped>
+///   jsonl             one cell of the results file per line, with the word for it, its marks and what stands beside them
+///   junit             one test case per cell: see junit.h
 std::string export_results(const RunRecord& run, const std::string& format, const std::string& file);
 
 }  // namespace nullmark

@@ -5,9 +5,7 @@
 
 #include "harness/expectation.h"
 #include "harness/order.h"
-#include "harness/results_json.h"
-#include "harness/summary.h"
-#include "harness/verdict_json.h"
+#include "harness/words.h"
 
 namespace nullmark {
 
@@ -41,25 +39,31 @@ std::string shell_quoted(const std::string& text) {
   return result + "'";
 }
 
-/// How a cell ended: element name ("" for a pass) and message.
+/// How a cell ended: element name ("" for a pass) and what it says.
 struct Ending {
   const char* element = "";
   std::string message;
 };
 
 Ending ending(const CellRecord& record) {
-  if (record.status == Status::error) return {"error", record.reason};
-  if (record.status != Status::ok) return {"skipped", record.reason.empty() ? to_string(record.status) : record.reason};
-  if (!record.verdict) return {};
-  const VerdictRecord& verdict = *record.verdict;
-  if (verdict.unbiased == Outcome::fail || verdict.own_mean == Outcome::fail) return {"failure", "FAIL: " + verdict.reason};
-  if (verdict.lawful == Outcome::fail) return {"failure", "FAIL: a law of the walks is broken"};
-  if (verdict.lookups == Outcome::fail) return {"failure", "FAIL: lookups differ from their expectation"};
-  if (verdict.unbiased == Outcome::inconclusive || verdict.own_mean == Outcome::inconclusive)
-    return {"skipped", "INCONCLUSIVE: " + verdict.reason};
-  if (verdict.unbiased == Outcome::violated || verdict.own_mean == Outcome::violated)
-    return {"skipped", "VIOLATED: " + reason_of(record)};
-  return {};
+  const std::string finding = finding_of(record);
+  const auto says = [&] { return finding.empty() ? marked_word(record) : fmt::format("{}: {}", marked_word(record), finding); };
+  switch (kind_of(record)) {
+    case Kind::pass:
+      return {"", says()};
+    case Kind::fail:
+      return {"failure", says()};
+    case Kind::error:
+      return {"error", finding};
+    case Kind::not_run:
+      return {"skipped", finding};
+    case Kind::expected_open:
+    case Kind::unexpected_open:
+    case Kind::violated:
+    case Kind::unclaimed:
+      break;
+  }
+  return {"skipped", says()};
 }
 
 }  // namespace
@@ -81,7 +85,7 @@ std::string junit(const RunRecord& run, const std::string& file) {
     const std::string_view element = end.element;
     cases += fmt::format("    <testcase classname=\"{}\" name=\"{}\"", xml(record.cell.experiment), xml(record.cell.name));
     if (element.empty()) {
-      cases += "/>\n";
+      cases += fmt::format(">\n      <system-out>{}</system-out>\n    </testcase>\n", xml(end.message));
       continue;
     }
     ++(element == "failure" ? failures : element == "error" ? errors : skipped);

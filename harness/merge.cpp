@@ -28,6 +28,15 @@ const CellRecord* better(const CellRecord* a, const CellRecord* b) {
   return rank(*b) > rank(*a) ? b : a;
 }
 
+/// What a run was asked for, shards aside; JSON texts, empty where it does not say.
+std::pair<std::string, std::string> selection(const RunRecord& run) {
+  const auto text = [&](const char* key) {
+    const auto at = run.provenance.find(key);
+    return at == run.provenance.end() ? std::string() : at->second;
+  };
+  return {text("filter"), text("selected")};
+}
+
 }  // namespace
 
 RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<std::string>& names) {
@@ -64,6 +73,14 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
     for (const auto& [key, text] : part.provenance) list.back()[key] = Json::parse(text);
   }
   merged.provenance["parts"] = list.dump();
+  // Parts of one selection make it whole; those of several are measured by the whole configuration.
+  merged.provenance.erase("shard");
+  const bool same =
+      std::all_of(parts.begin(), parts.end(), [&](const RunRecord& part) { return selection(part) == selection(parts[0]); });
+  if (!same) {
+    merged.provenance.erase("filter");
+    merged.provenance.erase("selected");
+  }
   for (const Cell& cell : read_config(parts[0].config_text, names[0] + "#config").cells)
     if (const auto at = cells.find(cell.name); at != cells.end()) {
       merged.cells.push_back(*at->second.record);

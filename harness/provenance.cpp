@@ -87,21 +87,26 @@ std::string iso_time(std::chrono::system_clock::time_point time) {
 std::map<std::string, std::string> make_provenance(const RunContext& context, std::chrono::system_clock::time_point end) {
   const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
   const double seconds = std::chrono::duration<double>(end - context.start).count();
-  return {{"version", text(NULLMARK_VERSION)},
-          {"git", text({{"commit", NULLMARK_GIT_COMMIT}, {"dirty", kDirty}})},
-          {"compiler", text({{"name", compiler()}, {"flags", NULLMARK_COMPILER_FLAGS}, {"build_type", NULLMARK_BUILD_TYPE}})},
-          {"libc", text(libc())},
-          {"cpu", text({{"model", cpu_model()}, {"cores", std::thread::hardware_concurrency()}})},
-          {"threads", text(context.threads)},
-          {"verdict_share", context.verdict_share ? text(*context.verdict_share) : "null"},
-          {"statistics_share", context.statistics_share ? text(*context.statistics_share) : "null"},
-          {"simd_bits", text(simd_bits())},
-          {"target", text({{"march", NULLMARK_ARCH}, {"simd", simd_target()}})},
-          {"libraries", text(libraries())},
-          {"command_line", text(Json(context.command_line))},
-          {"seeds", text(Json(context.seeds))},
-          {"start", text(iso_time(context.start))},
-          {"seconds", text(seconds)}};
+  std::map<std::string, std::string> provenance = {
+      {"version", text(NULLMARK_VERSION)},
+      {"git", text({{"commit", NULLMARK_GIT_COMMIT}, {"dirty", kDirty}})},
+      {"compiler", text({{"name", compiler()}, {"flags", NULLMARK_COMPILER_FLAGS}, {"build_type", NULLMARK_BUILD_TYPE}})},
+      {"libc", text(libc())},
+      {"cpu", text({{"model", cpu_model()}, {"cores", std::thread::hardware_concurrency()}})},
+      {"threads", text(context.threads)},
+      {"verdict_share", context.verdict_share ? text(*context.verdict_share) : "null"},
+      {"statistics_share", context.statistics_share ? text(*context.statistics_share) : "null"},
+      {"simd_bits", text(simd_bits())},
+      {"target", text({{"march", NULLMARK_ARCH}, {"simd", simd_target()}})},
+      {"libraries", text(libraries())},
+      {"command_line", text(Json(context.command_line))},
+      {"seeds", text(Json(context.seeds))},
+      {"selected", text(context.selected)},
+      {"start", text(iso_time(context.start))},
+      {"seconds", text(seconds)}};
+  if (!context.filter.empty()) provenance["filter"] = text(context.filter);
+  if (!context.shard.empty()) provenance["shard"] = text(context.shard);
+  return provenance;
 }
 
 std::string version_line() {

@@ -12,7 +12,9 @@ namespace nullmark {
 /// What a run was made with and on: source, compiler, machine, libraries, command; values are JSON texts.  No host name.
 struct RunContext {
   std::vector<std::string> command_line;
-  int threads = 0;  ///< cores used
+  int threads = 0;            ///< cores used
+  std::string filter, shard;  ///< as given; empty: all cells
+  std::size_t selected = 0;   ///< cells that the filter picks, of all shards, and those that were there before
   /// Time of the verdicts' evidence, and of all statistics, over that of the sampling.
   std::optional<double> verdict_share, statistics_share;
   std::vector<std::uint64_t> seeds;

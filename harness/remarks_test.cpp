@@ -6,6 +6,7 @@
 #include "harness/json_input.h"
 #include "harness/record_examples.h"
 #include "harness/summary.h"
+#include "harness/words.h"
 
 namespace nullmark {
 namespace {

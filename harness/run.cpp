@@ -6,6 +6,7 @@
 #include <tbb/parallel_for_each.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <exception>
@@ -26,6 +27,7 @@
 #include "harness/ray_memory.h"
 #include "harness/timing.h"
 #include "harness/verdict.h"
+#include "harness/words.h"
 #include "harness/workshop.h"
 
 namespace nullmark {
@@ -121,12 +123,26 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function
   return pilot;
 }
 
-bool is_judged(const PreparedCell& prepared) {
+/// Why a cell has no verdict; empty where it has one.
+std::string why_not_judged(const PreparedCell& prepared) {
   const bool predicts_itself = !prepared.theory.ray_variance.empty();
-  const bool claims = prepared.claim == Claim::exact || prepared.claim == Claim::unbiased ||
-                      (prepared.claim == Claim::consistent && predicts_itself && prepared.targets.names.empty());
-  return prepared.cell->gate.enabled && prepared.takes_part && claims && prepared.targets.known &&
-         prepared.cell->measurement == Measurement{};
+  if (!prepared.cell->gate.enabled) return "the configuration disables the verdict";
+  if (!prepared.takes_part) return "the estimator takes no part";
+  if (prepared.claim == Claim::biased) return "the estimator claims nothing";
+  if (prepared.claim == Claim::consistent && !(predicts_itself && prepared.targets.names.empty()))
+    return "the estimator claims to be consistent and predicts no mean to test";
+  if (!prepared.targets.known) return "there is no reference";
+  if (prepared.cell->measurement != Measurement{}) return "no claim covers samples that are clamped or rounded";
+  return "";
+}
+
+bool is_judged(const PreparedCell& prepared) { return why_not_judged(prepared).empty(); }
+
+/// Any tracker is right where there is nothing to meet.  Light may still meet surfaces.
+bool tests_nothing(const PreparedCell& prepared) {
+  const std::vector<Real>& depth = prepared.scene->reference->depth;
+  return prepared.cell->quantity != Quantity::radiance &&
+         std::all_of(depth.begin(), depth.end(), [](Real of_ray) { return of_ray == 0; });
 }
 
 /// The tests of a cell; nothing for cells that claim nothing that could be tested.
@@ -301,7 +317,7 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
 /// What the verdict of a cell can be expected to say, before anything is sampled.
 void foresee(const PreparedCell& prepared, const TestLevels& levels, Prediction& prediction) {
   prediction.most = prepared.samples_per_ray;
-  if (!is_judged(prepared)) {
+  if (!is_judged(prepared) || tests_nothing(prepared)) {
     prediction.verdict = "not judged";
     return;
   }
@@ -448,6 +464,29 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
   }
 }
 
+/// Where samples are not finite or walks did not end, what is left of them has no say; references and theory stand.
+void drop_sampled_statistics(CellRecord& record) {
+  for (ChannelRecord& channel : record.channel) {
+    for (std::optional<Real> ChannelRecord::*figure :
+         {&ChannelRecord::mean, &ChannelRecord::bias, &ChannelRecord::rmse, &ChannelRecord::variance, &ChannelRecord::kurtosis})
+      (channel.*figure).reset();
+    if (!channel.variance_theory) channel.relative_variance.reset();
+  }
+  if (record.variance_basis == "sample") record.variance_basis.clear();
+  record.convergence.clear();
+  record.squared_error_blocks.clear();
+}
+
+/// The verdict, or why there is none.  A bias is one even where there is nothing to meet; a PASS is none.
+void add_verdict(CellRecord& record, const PreparedCell& prepared, const std::optional<VerdictRecord>& verdict) {
+  record.verdict = verdict;
+  if (verdict && tests_nothing(prepared) && kind_of(record) != Kind::fail) {
+    record.verdict.reset();
+    record.reason = "no ray meets any extinction: nothing was tested";
+  }
+  if (!verdict && record.reason.empty()) record.reason = why_not_judged(prepared);
+}
+
 /// What a cell's pixels hold, unrounded but for single precision: mean, reference, variance and what theory says of it per
 /// channel, lookups and null collisions.
 std::vector<Layer> layers(const PreparedCell& prepared, const Sampled& sampled) {
@@ -569,7 +608,10 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     record.status = Status::error;
     record.reason = fmt::format("{} walks exceeded the bound on lookups", outcome.effort.overruns);
   }
-  if (record.status == Status::ok) record.verdict = verdict;
+  if (record.status == Status::ok)
+    add_verdict(record, prepared, verdict);
+  else
+    drop_sampled_statistics(record);
   write_images(record, prepared, *sampled, options, observer);
   return outcome;
 }

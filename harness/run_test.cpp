@@ -8,8 +8,14 @@
 #include <atomic>
 #include <stdexcept>
 
+#include "harness/compare.h"
 #include "harness/config.h"
+#include "harness/export.h"
+#include "harness/report/data.h"
 #include "harness/results_json.h"
+#include "harness/stability.h"
+#include "harness/summary.h"
+#include "harness/table.h"
 #include "harness/timing.h"
 
 namespace nullmark {
@@ -56,23 +62,53 @@ TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
   EXPECT_GT(loose.verdict->tests.at(0).reference_error, 1e-4);
 }
 
-/// A channel whose samples are not finite has no groups; the others keep theirs, and the results can be read.
-TEST(Run, AChannelThatIsNotFiniteTakesNothingFromTheOthers) {
+/// What is left of samples that are not all finite has no say.
+TEST(Run, ACellThatIsNotFiniteKeepsReferencesAndTheoryAlone) {
   const Plan cells =
       read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
-      "samples_per_ray":64,"matrix":{"estimator":{"type":"residual_ratio","control":"maximum","component":"residual"},
-      "medium":[{"type":"linear","optical_depth":0.01,"spectrum":[1,1e6]},{"type":"linear","optical_depth":0.01,"spectrum":[1e6,1]}]}}]})",
+      "samples_per_ray":64,"matrix":{"estimator":{"type":"planted_nan","chance":0.5},
+      "medium":["linear",{"type":"linear","spectrum":[1,2]}]}}]})",
                   "test.json");
   RunRecord results;
   results.cells = run(cells, 1, {});
-  const RunRecord again = read_results(results_text(results), "r.json");
-  for (const std::size_t finite : {std::size_t{0}, std::size_t{1}}) {
-    const CellRecord& record = again.cells.at(finite);
+  RunRecord again = read_results(results_text(results), "r.json");
+  for (const CellRecord& record : again.cells) {
     EXPECT_EQ(record.status, Status::error);
-    ASSERT_EQ(record.convergence.at(0).rmse.size(), 2u);
-    EXPECT_TRUE(record.convergence[0].rmse[finite]);
-    EXPECT_FALSE(record.convergence[0].rmse[1 - finite]);
+    EXPECT_GT(record.nonfinite, 0u);
+    ASSERT_EQ(record.channel.size(), static_cast<std::size_t>(record.channels));
+    for (const ChannelRecord& channel : record.channel) {
+      EXPECT_TRUE(channel.reference);
+      for (const auto& figure : {channel.mean, channel.bias, channel.rmse, channel.variance, channel.kurtosis})
+        EXPECT_FALSE(figure);
+      EXPECT_EQ(channel.relative_variance.has_value(), channel.variance_theory.has_value());
+    }
+    EXPECT_TRUE(record.convergence.empty());
+    EXPECT_TRUE(record.squared_error_blocks.empty());
+    EXPECT_GT(record.lookups, 0u) << "walks are counted all the same";
   }
+  // Nothing that shows results stumbles over what is absent.
+  const Summary summary = summarise(again);
+  EXPECT_EQ(summary.errors, 2u);
+  EXPECT_NE(summary_text(again, summary).find("ERROR: "), std::string::npos);
+  EXPECT_NE(results_tables(again).find("error: "), std::string::npos);
+  EXPECT_NE(stability_text(again).find("2 ERROR"), std::string::npos);
+  EXPECT_EQ(compare_text({again}, "", true), "");
+  EXPECT_TRUE(report_data({again}, {"r.json"}, "", "").json["cells"][0]["mean"][0].is_null());
+  for (const std::string& format : export_formats()) EXPECT_FALSE(export_results(again, format, "r.json").empty());
+  EXPECT_EQ(export_results(again, "csv", "r.json").find(",nan,"), std::string::npos);
+}
+
+/// A tracker that is wrong where there is nothing to meet is wrong.
+TEST(Run, ABiasIsProvenEvenInVacuum) {
+  const Plan cells = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e",
+      "rays":{"type":"single","from":[0,0.5,0.5],"to":[1,0.5,0.5]},"samples_per_ray":20000,
+      "matrix":{"estimator":["ratio","planted_zero"],"medium":{"type":"homogeneous","extinction":0}}}]})",
+                                 "test.json");
+  const std::vector<CellRecord> records = run(cells, 1, {});
+  EXPECT_FALSE(records.at(0).verdict);
+  EXPECT_EQ(records[0].reason, "no ray meets any extinction: nothing was tested");
+  ASSERT_TRUE(records.at(1).verdict);
+  EXPECT_EQ(records[1].verdict->unbiased, Outcome::fail);
 }
 
 /// Fewer samples share the cost of a walk through many cells, so each costs more; how much more is measured, not its sign alone.

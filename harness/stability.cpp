@@ -10,8 +10,8 @@
 
 #include "harness/cell_names.h"
 #include "harness/metrics.h"
-#include "harness/summary.h"
 #include "harness/table.h"
+#include "harness/words.h"
 
 namespace nullmark {
 namespace {
@@ -50,7 +50,7 @@ struct Case {
 
   void add(const CellRecord& record) {
     ++cells;
-    verdicts.add(verdict_word(record));
+    verdicts.add(marked_word(record));
     if (record.status != Status::ok) guards.add(record.reason);
     if (record.status == Status::skipped || record.status == Status::not_run) return;
     samples += record.samples;

@@ -12,7 +12,7 @@
 #include "harness/names.h"
 #include "harness/results_json.h"
 #include "harness/transport_json.h"
-#include "harness/verdict_json.h"
+#include "harness/words.h"
 
 namespace nullmark {
 namespace {
@@ -49,15 +49,14 @@ std::string shown(const ChannelRecord& channel, const std::optional<Real>& value
   return heavy_tailed(channel) && theory ? short_number(theory) + "*" : short_number(value);
 }
 
-/// What was proven: of the mean, and of the lookups where that is not a PASS.
-std::string proven(const CellRecord& record) {
-  if (!record.verdict) return "-";
-  const VerdictRecord& verdict = *record.verdict;
-  std::string word = to_string(verdict.unbiased);
-  if (verdict.against == "own mean") word = fmt::format("own mean {}", to_string(verdict.own_mean));
-  if (verdict.lawful == Outcome::fail) word += ", laws FAIL";
-  if (verdict.lookups == Outcome::fail) word += ", lookups FAIL";
-  return word.empty() ? "-" : word;
+/// The status, and what stands beside the verdict's word: what a PASS proves, the reason of a FAIL.
+std::string status_of(const CellRecord& record) {
+  std::string text = to_string(record.status);
+  if (!record.reason.empty()) text += ": " + record.reason;
+  const Kind kind = kind_of(record);
+  if (const std::string finding = finding_of(record); (kind == Kind::pass || kind == Kind::fail) && !finding.empty())
+    text += ", " + finding;
+  return text;
 }
 
 std::string output_name(const CellRecord& record, std::size_t c) {
@@ -79,8 +78,8 @@ Line channel_line(const CellRecord& record, std::size_t c) {
           once(metric(record, "ns_per_lookup")),
           once(record.time ? std::optional(record.time->floor_ratio) : std::nullopt),
           short_number(variance_x_ns(record, c)),
-          first ? proven(record) : "",
-          (first ? to_string(record.status) + (record.reason.empty() ? "" : ": " + record.reason) : std::string()) +
+          first ? marked_word(record) : "",
+          (first ? status_of(record) : std::string()) +
               (channel.reference || !channel.mean ? "" : fmt::format("{}mean {:.6g}", first ? ", " : "", *channel.mean))};
 }
 
@@ -89,7 +88,7 @@ void append_lines(const CellRecord& record, std::vector<Line>& lines) {
   if (!record.channel.empty()) return;
   Line line(lines[0].size(), "-");
   line.front() = tracker_label(record.cell);
-  line.back() = to_string(record.status) + (record.reason.empty() ? "" : ": " + record.reason);
+  line.back() = status_of(record);
   lines.push_back(line);
 }
 

@@ -28,6 +28,13 @@ namespace {
 constexpr Real kAlpha = 1e-4, kAlphaPass = 1e-3;
 const Real kNeeded = -std::log(kAlphaPass);
 
+/// Of a cell with this test alone.
+Outcome decide(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
+  const Proof proof = proven(test, alpha_fail, alpha_pass);
+  if (proof.biased) return Outcome::fail;
+  return proof.within ? Outcome::pass : Outcome::inconclusive;
+}
+
 TestRecord passing(int channel = 0) {
   TestRecord test;
   test.channel = channel;
@@ -181,7 +188,7 @@ TEST(Verdict, TheWorstTestDecides) {
 TEST(Verdict, ReasonsAreGivenAndForgotten) {
   VerdictRecord verdict = verdict_of({open_one(2)});
   decide(verdict);
-  EXPECT_EQ(verdict.reason, "channel 2: undecided after 1000 samples a ray; 800 were planned");
+  EXPECT_EQ(verdict.reason, "undecided after 1000 samples a ray; 800 were planned");
   verdict.tests = {passing()};
   decide(verdict);
   EXPECT_EQ(verdict.reason, "");
@@ -376,14 +383,14 @@ TEST(Summary, JunitAndMarkdownTellEveryEndOfACell) {
   const std::string xml = junit(run, "it's.json");
   EXPECT_NE(xml.find(R"(tests="5" failures="2" errors="0" skipped="2")"), std::string::npos) << xml;
   EXPECT_NE(xml.find(R"(name="a&lt;b &amp; &quot;c&quot;">)"), std::string::npos) << xml;
-  EXPECT_NE(xml.find("<failure message=\"FAIL: channel 0: log E = 100.0"), std::string::npos) << xml;
+  EXPECT_NE(xml.find("<failure message=\"FAIL: mean 0, expected 0: +0; biased, proven (log E 100.0 &gt; 9.2)"), std::string::npos) << xml;
   EXPECT_NE(xml.find("<failure message=\"FAIL: lookups"), std::string::npos) << xml;
-  EXPECT_NE(xml.find("<skipped message=\"INCONCLUSIVE: channel 0: undecided"), std::string::npos) << xml;
+  EXPECT_NE(xml.find("<skipped message=\"INCONCLUSIVE: undecided"), std::string::npos) << xml;
   EXPECT_NE(xml.find("<skipped message=\"VIOLATED"), std::string::npos) << xml;
   EXPECT_NE(xml.find(R"(jq .config 'it'\''s.json' | nullmark run - -o - --filter '^open$')"), std::string::npos) << xml;
   const std::string markdown = summary_markdown(run, summary, "r.json");
-  for (const char* row : {"| FAIL | a<b & \"c\" | channel 0: log E = 100.0", "| FAIL | costly | lookups differ",
-                          "| INCONCLUSIVE | open | channel 0: undecided", "| VIOLATED | violating |", "--filter '^costly$'"})
+  for (const char* row : {"| FAIL | a<b & \"c\" | mean 0, expected 0: +0; biased, proven (log E 100.0", "| FAIL | costly | lookups differ",
+                          "| INCONCLUSIVE | open | undecided", "| VIOLATED | violating |", "--filter '^costly$'"})
     EXPECT_NE(markdown.find(row), std::string::npos) << row << "\n" << markdown;
   EXPECT_EQ(markdown.find("good"), std::string::npos);
   EXPECT_NE(summary_text(run, summary).find("1 PASS, 2 FAIL, 0 INCONCLUSIVE as planned, 1 INCONCLUSIVE, 1 VIOLATED"),
@@ -538,7 +545,7 @@ TEST_F(Check, FailsABiasedEstimatorWithWhatRepeatsIt) {
     EXPECT_EQ(run("check r.json --junit j.xml --markdown m.md"), 3) << read("out");
     const std::string cell = results("r.json").cells.at(0).cell.name;
     EXPECT_NE(read("out").find("FAIL: " + cell), std::string::npos) << read("out");
-    EXPECT_NE(read("j.xml").find("<failure message=\"FAIL: channel"), std::string::npos) << read("j.xml");
+    EXPECT_NE(read("j.xml").find("; biased, proven (log E "), std::string::npos) << read("j.xml");
     EXPECT_NE(read("m.md").find("| FAIL | " + cell), std::string::npos) << read("m.md");
     const std::string command = reproduction(results("r.json").cells[0], "r.json");
     EXPECT_NE(read("m.md").find(command), std::string::npos) << command << read("m.md");
@@ -559,9 +566,9 @@ TEST_F(Check, OnlyOpenVerdictsAreNoSuccess) {
           R"("rays":"single","samples_per_ray":100,"matrix":{"estimator":["delta"],"medium":["linear"]},"gate":{"epsilon":0.001})"));
   ASSERT_EQ(run("run o.json -o r.json"), 0) << read("err");
   EXPECT_EQ(run("check r.json --junit j.xml"), 77) << read("out");
-  EXPECT_NE(read("j.xml").find("<skipped message=\"INCONCLUSIVE: PASS at epsilon 0.001 needs about"), std::string::npos)
+  EXPECT_NE(read("j.xml").find("<skipped message=\"INCONCLUSIVE (as planned, by laws): PASS at epsilon 0.001 needs about"), std::string::npos)
       << read("j.xml");
-  EXPECT_NE(read("out").find("INCONCLUSIVE (as planned)"), std::string::npos) << read("out");
+  EXPECT_NE(read("out").find("INCONCLUSIVE (as planned, by laws)"), std::string::npos) << read("out");
 }
 
 TEST_F(Check, NothingJudgedIsNoSuccess) {

@@ -21,7 +21,7 @@
 #include "harness/spec_json.h"
 #include "harness/summary.h"
 #include "harness/transport_json.h"
-#include "harness/verdict_json.h"
+#include "harness/words.h"
 
 namespace nullmark {
 namespace {
@@ -53,22 +53,13 @@ Json time_json(const CellRecord& record) {
 Json verdict_json_of(const CellRecord& record) {
   if (!record.verdict) return nullptr;
   const VerdictRecord& verdict = *record.verdict;
-  const bool of_itself = verdict.against == "own mean";
   Real evidence = 0, epsilon = 0;
   for (const TestRecord& test : verdict.tests) {
     if (test.channel < 0) continue;
     evidence = std::max(evidence, test.log_e_fail);
     if (test.group < 0) epsilon = std::max(epsilon, test.epsilon);
   }
-  return {{"outcome", to_string(of_itself ? verdict.own_mean : verdict.unbiased)},
-          {"against", verdict.against},
-          {"lookups", to_string(verdict.lookups)},
-          {"laws", to_string(verdict.lawful)},
-          {"as_planned", verdict.planned_undecidable},
-          {"reason", reason_of(record)},
-          {"epsilon", number(epsilon)},
-          {"log_e_fail", number(evidence)},
-          {"samples_per_ray", verdict.samples_per_ray}};
+  return {{"epsilon", number(epsilon)}, {"log_e_fail", number(evidence)}, {"samples_per_ray", verdict.samples_per_ray}};
 }
 
 Json cost_json(const Contender& contender) {
@@ -140,6 +131,12 @@ std::vector<std::string> output_names(const CellRecord& record) {
   return names;
 }
 
+std::vector<std::string> mark_names(const CellRecord& record) {
+  std::vector<std::string> names;
+  for (const Mark mark : marks_of(record)) names.emplace_back(mark_name(mark));
+  return names;
+}
+
 Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& images, const std::string& file) {
   const Cell& cell = record.cell;
   Json parameters = Json::object();
@@ -162,6 +159,10 @@ Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& image
           {"outputs", output_names(record)},
           {"status", to_string(record.status)},
           {"reason", record.reason},
+          {"word", verdict_word(kind_of(record))},
+          {"marked_word", marked_word(record)},
+          {"marks", mark_names(record)},
+          {"finding", finding_of(record)},
           {"n_rays", record.rays},
           {"samples_per_ray", cell.samples_per_ray},
           {"seed", cell.seed},

@@ -93,13 +93,7 @@ function secondsTo(cell, target) {
   return cell.cost?.seconds[target] ?? null;
 }
 
-/** One word for a cell, as `nullmark check` counts it. */
+/** The word that `nullmark check` counts a cell by. */
 function outcomeOf(cell) {
-  if (cell.status !== "ok") return cell.status.replace("_", " ");
-  const verdict = cell.verdict;
-  if (!verdict) return "nothing claimed";
-  const parts = [verdict.outcome, verdict.lookups, verdict.laws];
-  if (parts.includes("FAIL")) return "FAIL";
-  if (!["PASS", "INCONCLUSIVE", "VIOLATED"].includes(verdict.outcome)) return "nothing claimed";
-  return verdict.outcome === "INCONCLUSIVE" && verdict.as_planned ? "INCONCLUSIVE as planned" : verdict.outcome;
+  return cell.word;
 }

@@ -1,6 +1,6 @@
 // Summary, the configuration's tables, rankings, the table of every cell, commands.
 
-const outcomeMarks = { PASS: "✓", FAIL: "✗", VIOLATED: "!", INCONCLUSIVE: "?", "INCONCLUSIVE as planned": "?" };
+const outcomeMarks = { PASS: "✓", FAIL: "✗", VIOLATED: "!", INCONCLUSIVE: "?", "INCONCLUSIVE (as planned)": "?" };
 
 function outcomeBadge(text, word = text, more = {}) {
   const kind = word.split(" ")[0].toLowerCase();
@@ -11,8 +11,8 @@ const outcomeMeanings = {
   PASS: "a bias above epsilon is ruled out",
   FAIL: "bias is proven, or lookups or walks break a law",
   INCONCLUSIVE: "neither bias nor its absence is proven, though the plan foresaw a decision",
-  "INCONCLUSIVE as planned": "the plan said beforehand that no affordable number of samples decides",
-  "nothing claimed": "the estimator claims nothing here, or the configuration disables the verdict",
+  "INCONCLUSIVE (as planned)": "the plan said beforehand that no affordable number of samples decides",
+  "nothing claimed": "the estimator claims nothing here, nothing was tested, or the configuration disables the verdict",
 };
 
 function violationsText() {
@@ -26,15 +26,19 @@ function outcomeMeaning(word) {
   return word === "VIOLATED" ? violationsText() : outcomeMeanings[word] ?? "see the reasons in the table of every cell";
 }
 
-const verdictWords = [
-  ["pass", "PASS"], ["fail", "FAIL"], ["violated", "VIOLATED"], ["unexpected_open", "INCONCLUSIVE"],
-  ["expected_open", "INCONCLUSIVE as planned"], ["errors", "error"], ["not_run", "not run"], ["unclaimed", "nothing claimed"],
-];
+const verdictWords = ["PASS", "FAIL", "VIOLATED", "INCONCLUSIVE", "INCONCLUSIVE (as planned)", "ERROR", "not run", "nothing claimed"];
+
+/** How many cells of a word have each mark: "(3 by pilot, 1 own mean)". */
+function marksText(cells) {
+  const counts = new Map();
+  for (const mark of cells.flatMap((cell) => cell.marks)) counts.set(mark, (counts.get(mark) ?? 0) + 1);
+  return counts.size === 0 ? "" : element("small", {}, `(${[...counts].map(([mark, count]) => `${count} ${mark}`).join(", ")}) `);
+}
 
 function verdictTotals() {
-  const counts = verdictWords.map(([key, word]) => [word, report.runs.reduce((sum, run) => sum + run.verdicts[key], 0)]);
-  const badges = counts.filter(([, count]) => count > 0).map(([word, count]) =>
-    outcomeBadge(`${count} ${word}`, word, { href: "#verdicts", title: outcomeMeaning(word), onclick: () => chooseOutcome(word) }));
+  const cells = verdictWords.map((word) => [word, report.cells.filter((cell) => outcomeOf(cell) === word)]);
+  const badges = cells.filter(([, of]) => of.length > 0).flatMap(([word, of]) =>
+    [outcomeBadge(`${of.length} ${word}`, word, { href: "#verdicts", title: outcomeMeaning(word), onclick: () => chooseOutcome(word) }), marksText(of)]);
   return element("p", { className: "totals" }, ...badges);
 }
 
@@ -307,10 +311,9 @@ function textOf(of, title = of) {
   return (cell) => element("td", { title: title(cell) }, breakable(of(cell)));
 }
 
+/** What a PASS proves, the reason of the others. */
 function verdictReason(cell) {
-  const parts = [cell.reason, cell.verdict?.reason];
-  if (cell.verdict?.against === "own mean") parts.push("judged against its own mean");
-  return parts.filter(Boolean).join("; ");
+  return cell.finding;
 }
 
 function sceneOfCell(cell) {
@@ -322,7 +325,7 @@ const firstOf = (key) => (cell) => cell[key][0] ?? null;
 
 /** Columns of the table of every cell: how they are shown, and by what they are sorted. */
 const cellColumns = [
-  { title: "verdict", show: (cell) => element("td", {}, outcomeBadge(outcomeOf(cell), outcomeOf(cell), { title: verdictReason(cell) })), sort: outcomeOf },
+  { title: "verdict", show: (cell) => element("td", {}, outcomeBadge(cell.marked_word, outcomeOf(cell), { title: verdictReason(cell) })), sort: outcomeOf },
   { title: "estimator", show: (cell) => element("td", {}, markedLabel(cell.label)), sort: (cell) => cell.label },
   { title: "medium", show: textOf((cell) => shortMedium(cell.medium), (cell) => cell.medium), sort: (cell) => cell.medium },
   { title: "majorant", show: textOf((cell) => cell.majorant), sort: (cell) => cell.majorant },
@@ -361,7 +364,7 @@ function compareBy(column, descending) {
 const cellTable = { column: null, descending: false, page: 0, outcome: "", words: "", allRows: false };
 
 function searchText(cell) {
-  return `${cell.name} ${cell.label} ${cell.quantity} ${cell.light} ${outcomeOf(cell)} ${verdictReason(cell)}`.toLowerCase();
+  return `${cell.name} ${cell.label} ${cell.quantity} ${cell.light} ${cell.marked_word} ${verdictReason(cell)}`.toLowerCase();
 }
 
 function chosenCells() {
