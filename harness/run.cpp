@@ -85,13 +85,15 @@ Real lookups_of_a_sample(const Sampled& sampled) {
   return static_cast<Real>(sampled.counters.lookups) / static_cast<Real>(std::max<std::uint64_t>(1, sampled.counters.samples));
 }
 
-/// Variances from samples of their own, where theory has none.
-std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function<bool()>& stop) {
+/// Variances from samples of their own, where theory has none; some of them are kept.
+std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSamples>& kept, const std::function<bool()>& stop) {
   // Far beyond the samples of any verdict, so that the streams are others.
   constexpr std::uint64_t kFirst = std::uint64_t{1} << 62;
   const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                                   {kFirst, prepared.samples_per_ray, true}, nullptr, stop, [](double) {});
+                                   {.first = kFirst, .per_ray = prepared.samples_per_ray, .about_zero = true, .keep = true},
+                                   nullptr, stop, [](double) {});
   if (!sampled || prepared.samples_per_ray < 2) return std::nullopt;
+  if (sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   Pilot pilot;
   const std::size_t outputs = prepared.targets.outputs;
   const auto n = static_cast<Real>(prepared.samples_per_ray);
@@ -129,11 +131,12 @@ bool is_judged(const PreparedCell& prepared) {
 }
 
 /// The tests of a cell; nothing for cells that claim nothing that could be tested.
-std::optional<CellGate> gate_of(PreparedCell& prepared, const GateLevels& levels, const std::function<bool()>& stop) {
+std::optional<CellGate> gate_of(PreparedCell& prepared, const GateLevels& levels, std::vector<KeptSamples>& kept,
+                                const std::function<bool()>& stop) {
   if (!is_judged(prepared)) return std::nullopt;
   const bool spread_missing = !prepared.theory.ray_lookups.empty() && prepared.theory.ray_lookups_variance.empty();
   std::optional<Pilot> pilot;
-  if (prepared.theory.ray_variance.empty() || spread_missing) pilot = run_pilot(prepared, stop);
+  if (prepared.theory.ray_variance.empty() || spread_missing) pilot = run_pilot(prepared, kept, stop);
   return plan_gate(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim, prepared.theory, pilot,
                    levels);
 }
@@ -141,8 +144,9 @@ std::optional<CellGate> gate_of(PreparedCell& prepared, const GateLevels& levels
 /// Looks at the evidence of the planned samples and draws further ones while the verdict is open, as many again each time, up to
 /// four times what the plan foresees and never more than is allowed.  Nothing where interrupted.
 std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
-                                   const GateLevels& levels, const Families& families, Effort& effort,
-                                   const std::function<bool()>& stop, const std::function<void(double)>& progress) {
+                                   std::span<const KeptSamples> kept, const GateLevels& levels, const Families& families,
+                                   Effort& effort, const std::function<bool()>& stop,
+                                   const std::function<void(double)>& progress) {
   VerdictRecord verdict;
   verdict.against = gate.against;
   verdict.variance_basis = gate.variance_basis;
@@ -158,6 +162,8 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
   if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path && prepared.theory.unit_weights)
     for (const LawRecord& law : free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, {}, stop))
       verdict.laws.push_back(law);
+  if (const LawRecord law = replay_law(prepared.planned(), *prepared.scene, *prepared.kernel, kept, stop); law.samples > 0)
+    verdict.laws.push_back(law);
   verdict.alpha = levels.alpha;
   verdict.alpha_pass = levels.alpha_pass;
   verdict.planned = gate.planned;
@@ -447,12 +453,15 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     return outcome;
   }
   const auto progress = [&](double fraction) { observer.progress(record, fraction); };
-  const std::optional<CellGate> gate = gate_of(prepared, plan.levels, stop);
-  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                                   {0, prepared.samples_per_ray}, gate ? &*gate : nullptr, stop, progress);
+  std::vector<KeptSamples> kept;
+  const std::optional<CellGate> gate = gate_of(prepared, plan.levels, kept, stop);
+  const auto sampled =
+      sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
+                  {.per_ray = prepared.samples_per_ray, .keep = gate.has_value()}, gate ? &*gate : nullptr, stop, progress);
   if (sampled) outcome.effort += *sampled;
+  if (sampled && sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   std::optional<VerdictRecord> verdict;
-  if (sampled && gate) verdict = judge(prepared, *gate, *sampled, plan.levels, families, outcome.effort, stop, progress);
+  if (sampled && gate) verdict = judge(prepared, *gate, *sampled, kept, plan.levels, families, outcome.effort, stop, progress);
   if (!sampled || (gate && !verdict)) {
     record.reason = "interrupted";
     return outcome;
