@@ -159,9 +159,13 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
     verdict.laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range,
                              prepared.theory, {.each = lookups_of_a_sample(sampled)}, stop);
   // Bins are coarse; where weights are 1 the distribution itself can be looked at.
-  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path && prepared.theory.unit_weights)
-    for (const LawRecord& law : free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, {}, stop))
+  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path) {
+    const std::string why_not = why_no_free_path_laws(*prepared.scene, prepared.range, prepared.theory);
+    if (!why_not.empty()) verdict.untested.push_back("distribution of free paths: " + why_not);
+    for (const LawRecord& law :
+         free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop))
       verdict.laws.push_back(law);
+  }
   if (const LawRecord law = replay_law(prepared.planned(), *prepared.scene, *prepared.kernel, kept, stop); law.samples > 0)
     verdict.laws.push_back(law);
   verdict.alpha = levels.alpha;
