@@ -23,6 +23,7 @@
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 #include "harness/ray_memory.h"
+#include "harness/reliance.h"
 #include "harness/timing.h"
 #include "harness/verdict.h"
 #include "harness/workshop.h"
@@ -248,6 +249,8 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
     record.medium_hash = fmt::format("{:016x}", prepared.scene->medium->hash);
     if (record.channels > 1) record.effects.push_back("chromatic");
     if (cell.quantity == Quantity::radiance) record.effects = prepared.effects;
+    if (const auto alone = make_estimator(cell.estimator)->kernel(record.channels, cell.precision))
+      record.given_depth = alone->needs_optical_depth();
     if (!prepared.takes_part) record.reason = "constant extinction: closed-form flights, the estimator takes no part";
   }
   return record;
@@ -481,7 +484,10 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     record.status = Status::error;
     record.reason = fmt::format("{} walks exceeded the bound on lookups", outcome.effort.overruns);
   }
-  if (record.status == Status::ok) record.verdict = verdict;
+  if (record.status == Status::ok) {
+    record.verdict = verdict;
+    record.reliance = measure_reliance(prepared.planned(), *prepared.scene, *prepared.kernel, stop);
+  }
   write_images(record, prepared, *sampled, options, observer);
   return outcome;
 }
