@@ -18,8 +18,10 @@ namespace {
 std::vector<CellRecord> run_all(std::uint64_t seed, const std::string& gate) {
   std::string cells;
   for (const PlantedScene& scene : kPlantedScenes)
-    cells += fmt::format(R"({}{{"estimator":{},"medium":{},"majorant":{},"rays":{},"samples_per_ray":4096,"gate":{}}})",
-                         cells.empty() ? "" : ",", scene.estimator, scene.medium, scene.majorant, scene.rays, gate);
+    cells +=
+        fmt::format(R"({}{{"quantity":"{}","estimator":{},"medium":{},"majorant":{},"rays":{},"samples_per_ray":{},"gate":{}}})",
+                    cells.empty() ? "" : ",", scene.quantity, scene.estimator, scene.medium, scene.majorant, scene.rays,
+                    scene.samples_per_ray, gate);
   const Plan plan =
       read_config(fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"verdict":{{"alpha":1e-4}},
       "experiments":[{{"name":"planted","include":[{}]}}]}})",
@@ -27,6 +29,9 @@ std::vector<CellRecord> run_all(std::uint64_t seed, const std::string& gate) {
                   "planted.json", seed);
   return run_untimed(plan);
 }
+
+/// Ten standard errors of a reliance.
+constexpr Real kLeans = 0.05;
 
 bool breaks(const VerdictRecord& verdict, std::string_view law) {
   return std::any_of(verdict.laws.begin(), verdict.laws.end(),
@@ -38,6 +43,8 @@ bool caught(const CellRecord& record, const std::string& by) {
   if (!record.verdict) return false;
   const VerdictRecord& verdict = *record.verdict;
   if (by == "mean") return verdict.unbiased == Outcome::fail;
+  if (by == "open") return verdict.unbiased == Outcome::inconclusive && !verdict.planned_undecidable;
+  if (by == "reliance") return record.given_depth && std::abs(record.reliance.value_or(0)) > kLeans;
   if (by == "lookups") return verdict.lookups == Outcome::fail;
   if (by == "count_law") return breaks(verdict, "count");
   if (by == "position_law") return breaks(verdict, "conditional") || breaks(verdict, "positions") || breaks(verdict, "first");

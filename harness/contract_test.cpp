@@ -38,11 +38,19 @@ std::vector<CellRecord> run(const std::string& experiment, int threads = 0) {
   return run_untimed(plan, {}, threads);
 }
 
+/// Boxes of many lengths and begins: a tracker that forgets a length, or where its ray begins, is right in a unit box at 0.
 constexpr const char* kMedia = R"(
-  {"type":"homogeneous","extinction":0.7}, {"type":"linear","optical_depth":0.7}, {"type":"linear","begin":1,"end":0,"optical_depth":2},
-  {"type":"polynomial","coefficients":[[0.2,1,0.5],[1,-1,0.5,0.2]]}, {"type":"exponential","optical_depth":1},
-  {"type":"cosine","optical_depth":0.7}, {"type":"gaussian_bump","optical_depth":0.7}, {"type":"gaussian_hole","optical_depth":0.7},
-  {"type":"layers","values":[[0.2,3,0,1]]}, {"type":"checkerboard"}, {"type":"fractal_noise","peak":6,"octaves":3})";
+  {"type":"homogeneous","extinction":0.4,"hi":[1.75,1,1]}, {"type":"linear","optical_depth":0.7,"lo":[0.2,0,0],"hi":[0.8,1,1]},
+  {"type":"linear","begin":1,"end":0,"optical_depth":2,"lo":[-0.2,0,0],"hi":[1.4,1,1]},
+  {"type":"polynomial","coefficients":[[0.2,1,0.5],[1,-1,0.5,0.2]],"hi":[1.3,1,1]},
+  {"type":"exponential","optical_depth":1,"lo":[0.4,0,0],"hi":[0.9,1,1]}, {"type":"cosine","optical_depth":0.7,"hi":[1.6,1,1]},
+  {"type":"gaussian_bump","optical_depth":0.7,"lo":[0.1,0,0],"hi":[1.8,1,1]},
+  {"type":"gaussian_hole","optical_depth":0.7,"lo":[-0.1,0,0],"hi":[0.4,1,1]},
+  {"type":"layers","values":[[0.2,3,0,1]],"lo":[0.1,0,0],"hi":[1.2,1,1]}, {"type":"checkerboard","hi":[1.5,1,1]},
+  {"type":"fractal_noise","peak":6,"octaves":3,"lo":[-0.2,0,0],"hi":[1.1,1,1]})";
+
+/// Through all of them, from outside: it begins in none.
+constexpr const char* kThroughAll = R"({"type":"single","from":[-0.4,0.1,0.3],"to":[2,0.9,0.6]})";
 
 /// The rules for cells of relative variance below 100: mean within 5.5 analytic standard errors (4e-8 a test, two-sided normal),
 /// lookups within 1 %, variance within 5 %, at the planned samples.  Where tails are too heavy for that, as the estimator tells,
@@ -79,18 +87,18 @@ int agreeing(const std::vector<CellRecord>& records) {
 
 TEST(Contract, EveryHonestEstimatorMeetsMeanVarianceAndLookupsOnEveryMedium) {
   const auto records = run(fmt::format(
-      R"("rays":{{"type":"single","from":[0.02,0.1,0.3],"to":[0.97,0.9,0.6]}},"samples_per_ray":300000,
+      R"("rays":{},"samples_per_ray":300000,
           "matrix":{{"estimator":[{}],"medium":[{}],"majorant":["global",{{"type":"global","looseness":3}},{{"type":"grid","resolution":5}},
                                 {{"type":"kd_tree","resolution":16,"forced_depth":4,"crossing":"rewind"}}]}})",
-      honest_estimators(), kMedia));
+      kThroughAll, honest_estimators(), kMedia));
   EXPECT_GT(agreeing(records), 270);
 }
 
 TEST(Contract, ChromaticMediaAreMetChannelByChannel) {
   const auto records = run(fmt::format(
-      R"("rays":{{"type":"single","from":[0,0.5,0.5],"to":[1,0.4,0.6]}},"samples_per_ray":300000,
+      R"("rays":{{"type":"single","from":[-1,0.5,0.5],"to":[2,0.4,0.6]}},"samples_per_ray":300000,
           "matrix":{{"estimator":[{},{{"type":"delta","walks":"separate"}}],
-                    "medium":[{{"type":"linear","optical_depth":0.5,"spectrum":[1,3,0.2]}},
+                    "medium":[{{"type":"linear","optical_depth":0.5,"spectrum":[1,3,0.2],"hi":[1.6,1,1]}},
                               {{"type":"channels","media":[{{"type":"linear","optical_depth":1}},{{"type":"cosine","optical_depth":0.5}},
                                                            {{"type":"gaussian_bump","optical_depth":0.4}},{{"type":"homogeneous","extinction":0.3}}]}},
                               {{"type":"homogeneous","extinction":0.4,"spectrum":[0,1,2,3,1,1,1,1,1,1,1,1,1,1,0.5,2]}}],
@@ -107,14 +115,14 @@ TEST(Contract, ChromaticMediaAreMetChannelByChannel) {
 
 TEST(Contract, ControlsOfResidualTrackingMeetTheory) {
   const auto records = run(
-      R"("rays":{"type":"single","from":[0,0.5,0.5],"to":[1,0.5,0.5]},"samples_per_ray":300000,
+      R"("rays":{"type":"single","from":[-1,0.5,0.5],"to":[2,0.5,0.5]},"samples_per_ray":300000,
           "matrix":{"estimator":[{"type":"residual_ratio","control":["minimum","average","middle","maximum","medium_average","ray_average","gamma"],
                                   "component":["product","residual"]},
                                  {"type":"residual_ratio","control":["linear","exponential","given"],"value":0.3,"value_end":1.2},
                                  {"type":"residual_ratio","control":["minimum","average"],"rate_scale":0.7},
                                  {"type":"residual_ratio","control":"average","rate":"majorant"},
                                  {"type":"residual_delta","control":"given","value":0.05}],
-                    "medium":[{"type":"linear","begin":0.1,"end":1,"optical_depth":0.6931471805599453},
+                    "medium":[{"type":"linear","begin":0.1,"end":1,"optical_depth":0.6931471805599453,"lo":[-0.4,0,0],"hi":[1.2,1,1]},
                               {"type":"gaussian_hole","optical_depth":1,"spectrum":[1,2]}],
                     "majorant":["global",{"type":"grid","resolution":4}]})");
   EXPECT_GT(agreeing(records), 60);
@@ -123,10 +131,10 @@ TEST(Contract, ControlsOfResidualTrackingMeetTheory) {
 TEST(Contract, MarchesMeetTheirOwnPredictedMeanAndAreUnbiasedForDepthWhereJittered) {
   for (const char* quantity : {"transmittance", "optical_depth"}) {
     const auto records = run(fmt::format(
-        R"("quantity":"{}","rays":{{"type":"single","from":[0,0.5,0.5],"to":[1,0.5,0.5]}},"samples_per_ray":100000,
+        R"("quantity":"{}","rays":{},"samples_per_ray":100000,
             "matrix":{{"estimator":[{{"type":"ray_marching","steps":[3,16],"offset":["left","midpoint","right","uniform","stratified"]}}],
                       "medium":[{}]}})",
-        quantity, kMedia));
+        quantity, kThroughAll, kMedia));
     for (const CellRecord& record : records) {
       SCOPED_TRACE(record.cell.name);
       ASSERT_EQ(record.status, Status::ok) << record.reason;

@@ -598,7 +598,7 @@ TEST(FalseAlarms, TheProgramsOwnCells) {
       std::printf("FAIL %s: %s\n", record.cell.name.c_str(), verdict.reason.c_str());
     }
     passes += verdict.unbiased == Outcome::pass;
-    if (!verdict.laws.empty()) {
+    if (tests_walks(verdict)) {
       const Real needed = std::log(static_cast<Real>(verdict.laws.size()) / kAlone);
       ++lawful;
       law_alarms +=

@@ -58,10 +58,16 @@ struct Histogram {
 
 }  // namespace
 
-std::vector<LawRecord> free_path_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, const CellTheory& theory,
-                                      const LawBudget& budget, const std::function<bool()>& stop) {
+std::string why_no_free_path_laws(const Scene& scene, SampleRange range, const CellTheory& theory) {
+  if (scene.reference->channels > 1) return "the medium is chromatic";
+  if (theory.unit_weights || (range == SampleRange::binary && scene.bounding)) return "";
+  return range == SampleRange::binary ? "the majorant is not known to bound" : "weights are not 1";
+}
+
+std::vector<LawRecord> free_path_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleRange range,
+                                      const CellTheory& theory, const LawBudget& budget, const std::function<bool()>& stop) {
   const std::size_t rays = scene.rays->world.size(), taken = std::min(rays, kMostRays);
-  if (taken == 0 || scene.reference->channels > 1) return {};
+  if (taken == 0 || !why_no_free_path_laws(scene, range, theory).empty()) return {};
   const Real each = std::max<Real>(1, theory.lookups.value_or(1));
   const auto samples = static_cast<std::uint64_t>(std::clamp<Real>(budget.lookups / (each * static_cast<Real>(taken)), 100, 2e5));
   const std::uint64_t key = stream_key(cell, *scene.medium);

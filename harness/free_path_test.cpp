@@ -54,6 +54,40 @@ TEST(FreePath, HonestSamplersKeepTheLaw) {
   }
 }
 
+/// Every bin has its share, and the density within it is wrong; the sampler states no theory.
+TEST(FreePath, TheDistributionIsTestedWithoutATheory) {
+  const auto records = run(
+      R"("quantity":"free_path","rays":"single","samples_per_ray":65536,"gate":{"epsilon":0.02,"max_samples_per_ray":4000000},
+         "matrix":{"estimator":["planted_bin_shape"],"medium":[{"type":"homogeneous","extinction":1}]})");
+  ASSERT_TRUE(records.at(0).verdict) << records[0].reason;
+  EXPECT_NE(records[0].verdict->unbiased, Outcome::fail) << records[0].verdict->reason;
+  EXPECT_TRUE(records[0].verdict->untested.empty());
+  for (const char* name : {"kolmogorov_smirnov", "chi_square"}) {
+    ASSERT_TRUE(law(records[0], name)) << name;
+    EXPECT_EQ(law(records[0], name)->outcome, Outcome::fail) << name;
+  }
+}
+
+/// Where weights are not 1, and on chromatic media, the verdict says that the distribution was not tested.
+TEST(FreePath, SaysWhereTheDistributionIsNotTested) {
+  const auto records = run(
+      R"("quantity":"free_path","rays":"single","samples_per_ray":1000,
+         "matrix":{"estimator":["null_collision"],"medium":[{"type":"linear","albedo":0.5},{"type":"linear","spectrum":[1,0.5]}],
+                   "majorant":[{"type":"global","looseness":0.5},"global"]})");
+  ASSERT_EQ(records.size(), 4u);
+  for (const CellRecord& record : records) {
+    SCOPED_TRACE(record.cell.name);
+    ASSERT_TRUE(record.verdict) << record.reason;
+    if (record.verdict->unbiased == Outcome::violated) continue;
+    const bool tested = law(record, "chi_square");
+    EXPECT_EQ(record.verdict->untested.size(), tested ? 0u : 1u);
+    if (!tested) {
+      EXPECT_EQ(record.verdict->untested.at(0), record.channels > 1 ? "distribution of free paths: the medium is chromatic"
+                                                                    : "distribution of free paths: weights are not 1");
+    }
+  }
+}
+
 /// The published listing of analog decomposition forgets the residual's path at each null collision.
 TEST(FreePath, TheListingThatForgetsItsPathIsFoundOut) {
   const auto records = run(fmt::format(

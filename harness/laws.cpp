@@ -8,9 +8,6 @@
 namespace nullmark {
 namespace {
 
-/// A deterministic contradiction: no chance explains it.
-constexpr Real kCertain = 1e6;
-
 /// Streams of the laws, far from those of means, verdicts and pilots.
 constexpr std::uint64_t kFirstSample = std::uint64_t{1} << 61;
 
@@ -71,7 +68,7 @@ class LawTester {
     const std::uint64_t key = stream_key(cell_, *scene_.medium);
     std::vector<Real> before, now;  // centred first flights of the ray before and of this one
     Recording recording;
-    SampleBlock block, alone;
+    SampleBlock block;
     Counters counters;
     for (const std::size_t ray : rays_) {
       scene_.context(ray, kernel_, context_);
@@ -89,15 +86,6 @@ class LawTester {
           take(ray, recording.walks[i], &block.values[i * outputs_]);
           now.push_back(centred_flight(recording.walks[i]));
         }
-        // A sample is a function of its address: drawn alone it is the same.
-        const std::size_t last = block.lookups.size() - 1;
-        kernel_.sample(*workspace, *scene_.medium->medium, context_, key, kFirstSample + done + last, 1, cell_.quantity, alone,
-                       counters);
-        for (std::size_t c = 0; c < outputs_; ++c) {
-          const Real together = block.values[last * outputs_ + c];
-          if (together != alone.values[c] && std::isfinite(together)) other_alone_ = true;
-        }
-        ++replayed_;
       }
       for (std::size_t i = 1; i < now.size(); ++i) serial_.bet(now[i] * now[i - 1] / 2);
       for (std::size_t i = 0; i < std::min(before.size(), now.size()); ++i) across_.bet(before[i] * now[i] / 2);
@@ -121,7 +109,6 @@ class LawTester {
       if (mapped_ > 0) add("mapping", badly_mapped_ ? kCertain : 0, mapped_);
       add("independence", log_mean_exp(std::vector{serial_.log(), across_.log()}), pairs_);
     }
-    add("replay", other_alone_ ? kCertain : 0, replayed_);
     add("conditional", conditional(), conditional_count_);
     if (!theory_.ray_variance.empty() && varied_ > 0) add("variance", variance_.log(), varied_);
     return records;
@@ -267,9 +254,9 @@ class LawTester {
   Real majorant_depth_ = 0, bound_ = 0;                   // of the ray; of (X - T)^2 on it
   std::vector<std::vector<std::vector<Real>>> by_count_;  // [ray][count * channels + c]: variance, then samples
 
-  std::uint64_t collisions_ = 0, mapped_ = 0, pairs_ = 0, replayed_ = 0, varied_ = 0, conditional_count_ = 0;
+  std::uint64_t collisions_ = 0, mapped_ = 0, pairs_ = 0, varied_ = 0, conditional_count_ = 0;
   Real flown_ = 0;
-  bool ended_early_ = false, badly_mapped_ = false, impossible_ = false, other_alone_ = false;
+  bool ended_early_ = false, badly_mapped_ = false, impossible_ = false;
   std::vector<Real> first_, all_;
   Wealth serial_{{0.4, 1.6}}, across_{{0.4, 1.6}}, variance_{{0.1, 0.4, 1.6}};
 };

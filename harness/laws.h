@@ -9,6 +9,9 @@
 
 namespace nullmark {
 
+/// Evidence of a deterministic contradiction: no chance explains it.
+inline constexpr Real kCertain = 1e6;
+
 /// Tests of how walks behave rather than of their mean: they gate optical depths at which no affordable number of samples decides
 /// a mean.  Walks are drawn by the cell's own kernel, with streams of their own, and written down.
 ///
@@ -20,13 +23,13 @@ namespace nullmark {
 ///   mapping       the majorant integrated from the ray's begin to each lookup is the depth the flight says
 ///   conditional   E[X | K = k] and its variance, of products (CountLaw)
 ///   independence  first flights of consecutive samples, and of neighbouring rays, are uncorrelated
-///   replay        a sample drawn alone is bit for bit the one drawn among others
+///   replay        samples drawn again in another order and company are the same bit for bit, see replays.h
 ///   variance      (X - T)^2 has the mean that theory states
 ///   kolmogorov_smirnov, chi_square   the law of free paths, see free_path_law.h
 ///   segments      the ray cut into pieces shallow enough for mean tests of their own
 ///
-/// Depths are the majorant's.  Flights that are rewound at the ends of cells follow the same laws: an exponential cut at a depth and
-/// drawn anew from there leaves the collisions a Poisson process of rate 1 in depth.
+/// Depths are the majorant's.  Flights that are rewound at the ends of cells follow the same laws: an exponential cut at a depth
+/// and drawn anew from there leaves the collisions a Poisson process of rate 1 in depth.
 ///
 /// Returns log E (or -log p) of each law that applies; a law that holds exceeds log(1/a) with probability at most a.
 struct LawBudget {

@@ -40,8 +40,9 @@ std::vector<CellRecord> run(const std::string& samples, const std::string& matri
 }
 
 CellRecord run(const PlantedScene& scene) {
-  return run(fmt::format("{}", kSamplesPerRay), fmt::format(R"("estimator":[{}],"medium":[{}],"majorant":[{}],"rays":[{}])",
-                                                            scene.estimator, scene.medium, scene.majorant, scene.rays))
+  return run(fmt::format("{}", kSamplesPerRay),
+             fmt::format(R"("quantity":["{}"],"estimator":[{}],"medium":[{}],"majorant":[{}],"rays":[{}])", scene.quantity,
+                         scene.estimator, scene.medium, scene.majorant, scene.rays))
       .at(0);
 }
 
@@ -60,7 +61,8 @@ TEST(Planted, EachHasAScene) {
 
 TEST(Planted, EachNamesTheCheckThatMustCatchIt) {
   const std::set<std::string> checks = {"mean",         "count_law", "replay",    "lookups", "variance",
-                                        "independence", "audit",     "nonfinite", "groups",  "position_law"};
+                                        "independence", "audit",     "nonfinite", "groups",  "position_law",
+                                        "chi_square",   "reliance",  "open"};
   for (const std::string& name : planted())
     EXPECT_TRUE(checks.contains(Registry<EstimatorEntry>::instance().find(name)->caught_by)) << name;
 }

@@ -44,8 +44,8 @@ EstimatorEntry estimator_entry() {
   return entry;
 }
 
-/// `Bug` has kCaughtBy: "mean", "count_law", "replay", "lookups", "variance", "independence", "audit", "nonfinite", "groups" or
-/// "position_law".
+/// `Bug` has kCaughtBy: "mean", "count_law", "replay", "lookups", "variance", "independence", "audit", "nonfinite", "groups",
+/// "position_law", "chi_square", "reliance" (CellRecord::reliance says so) or "open" (an INCONCLUSIVE that was not planned).
 template <template <class> class Bug, class Source = EstimatorTemplate<Bug>>
 EstimatorEntry planted_entry() {
   EstimatorEntry entry = estimator_entry<Bug>();

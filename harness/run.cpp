@@ -25,6 +25,7 @@
 #include "harness/names.h"
 #include "harness/parameter_values.h"
 #include "harness/ray_memory.h"
+#include "harness/reliance.h"
 #include "harness/timing.h"
 #include "harness/verdict.h"
 #include "harness/words.h"
@@ -88,13 +89,15 @@ Real lookups_of_a_sample(const Sampled& sampled) {
   return static_cast<Real>(sampled.counters.lookups) / static_cast<Real>(std::max<std::uint64_t>(1, sampled.counters.samples));
 }
 
-/// Variances from samples of their own, where theory has none.
-std::optional<Pilot> run_pilot(const PreparedCell& prepared, const std::function<bool()>& stop) {
+/// Variances from samples of their own, where theory has none; some of them are kept.
+std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSamples>& kept, const std::function<bool()>& stop) {
   // Far beyond the samples of any verdict, so that the streams are others.
   constexpr std::uint64_t kFirst = std::uint64_t{1} << 62;
   const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                                   {.first = kFirst, .per_ray = prepared.samples_per_ray}, nullptr, stop, [](double) {});
+                                   {.first = kFirst, .per_ray = prepared.samples_per_ray, .keep = true}, nullptr, stop,
+                                   [](double) {});
   if (!sampled || prepared.samples_per_ray < 2) return std::nullopt;
+  if (sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   Pilot pilot;
   const std::size_t outputs = prepared.targets.outputs;
   const auto n = static_cast<Real>(prepared.samples_per_ray);
@@ -146,18 +149,20 @@ bool tests_nothing(const PreparedCell& prepared) {
 }
 
 /// The tests of a cell; nothing for cells that claim nothing that could be tested.
-std::optional<CellGate> gate_of(PreparedCell& prepared, const TestLevels& levels, const std::function<bool()>& stop) {
+std::optional<CellGate> gate_of(PreparedCell& prepared, const TestLevels& levels, std::vector<KeptSamples>& kept,
+                                const std::function<bool()>& stop) {
   if (!is_judged(prepared)) return std::nullopt;
   const bool spread_missing = !prepared.theory.ray_lookups.empty() && prepared.theory.ray_lookups_variance.empty();
   std::optional<Pilot> pilot;
   const bool exact = prepared.claim == Claim::exact;
-  if ((prepared.theory.ray_variance.empty() && !exact) || spread_missing) pilot = run_pilot(prepared, stop);
+  if ((prepared.theory.ray_variance.empty() && !exact) || spread_missing) pilot = run_pilot(prepared, kept, stop);
   return plan_gate(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim, prepared.theory, pilot,
                    levels);
 }
 
 /// Laws of how the cell's samples and walks behave, where its configuration asks for them.
 std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
+                               std::span<const KeptSamples> kept, std::vector<std::string>& untested,
                                const std::function<bool()>& stop) {
   std::vector<LawRecord> laws;
   const LawPolicy policy = prepared.cell->gate.laws;
@@ -166,9 +171,15 @@ std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gat
     laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range, prepared.theory,
                      {.each = lookups_of_a_sample(sampled)}, stop);
   // Bins are coarse; where weights are 1 the distribution itself can be looked at.
-  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path && prepared.theory.unit_weights)
-    for (const LawRecord& law : free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, {}, stop))
+  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path) {
+    const std::string why_not = why_no_free_path_laws(*prepared.scene, prepared.range, prepared.theory);
+    if (!why_not.empty()) untested.push_back("distribution of free paths: " + why_not);
+    for (const LawRecord& law :
+         free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop))
       laws.push_back(law);
+  }
+  if (const LawRecord law = replay_law(prepared.planned(), *prepared.scene, *prepared.kernel, kept, stop); law.samples > 0)
+    laws.push_back(law);
   return laws;
 }
 
@@ -226,7 +237,10 @@ class Judging {
     open_reason_ += "; " + gate.remedies;
   }
 
-  void add_laws(std::vector<LawRecord> laws) { verdict_.laws = std::move(laws); }
+  void add_laws(std::vector<LawRecord> laws, std::vector<std::string> untested) {
+    verdict_.laws = std::move(laws);
+    verdict_.untested = std::move(untested);
+  }
   void count_lookups(std::uint64_t walks) { verdict_.counted_walks = walks; }
 
   const VerdictRecord& decided() {
@@ -294,10 +308,13 @@ class Judging {
 
 /// Looks at the evidence of the first samples and draws further ones while the verdict is open.  Nothing where interrupted.
 std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
-                                   const GateLevels& levels, const Families& families, Effort& effort,
-                                   const std::function<bool()>& stop, const std::function<void(double)>& progress) {
+                                   std::span<const KeptSamples> kept, const GateLevels& levels, const Families& families,
+                                   Effort& effort, const std::function<bool()>& stop,
+                                   const std::function<void(double)>& progress) {
   Judging judging(prepared, gate, sampled, levels, families);
-  judging.add_laws(laws_of(prepared, gate, sampled, stop));
+  std::vector<std::string> untested;
+  std::vector<LawRecord> laws = laws_of(prepared, gate, sampled, kept, untested, stop);
+  judging.add_laws(std::move(laws), std::move(untested));
   // A mean to a hundredth would take more samples than the rest of the verdict.
   if (!gate.lookups.empty() && gate.tests.back().planned > std::max(prepared.samples_per_ray, gate.planned))
     judging.count_lookups(
@@ -355,6 +372,8 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
     record.medium_hash = fmt::format("{:016x}", prepared.scene->medium->hash);
     if (record.channels > 1) record.effects.push_back("chromatic");
     if (cell.quantity == Quantity::radiance) record.effects = prepared.effects;
+    if (const auto alone = make_estimator(cell.estimator)->kernel(record.channels, cell.precision))
+      record.given_depth = alone->needs_optical_depth();
     if (!prepared.takes_part) record.reason = "constant extinction: closed-form flights, the estimator takes no part";
   }
   return record;
@@ -591,8 +610,9 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
   const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
                                    {0, prepared.samples_per_ray}, gate ? &*gate : nullptr, stop, progress);
   if (sampled) outcome.effort += *sampled;
+  if (sampled && sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   std::optional<VerdictRecord> verdict;
-  if (sampled && gate) verdict = judge(prepared, *gate, *sampled, plan.levels, families, outcome.effort, stop, progress);
+  if (sampled && gate) verdict = judge(prepared, *gate, *sampled, kept, plan.levels, families, outcome.effort, stop, progress);
   if (!sampled || (gate && !verdict)) {
     record.reason = "interrupted";
     return outcome;

@@ -287,6 +287,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   result.groups.resize(outputs);
 
   if (gate) result.evidence.resize(gate->tests.size());
+  if (span.keep) result.kept = KeptSamples(rays, span.first, span.per_ray, outputs);
 
   std::vector<ChunkResult> results(chunks.size());
   std::atomic<bool> stopped = false;
@@ -362,6 +363,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, span.first + chunk.first + drawn, batch,
                       cell.quantity, mine.block, out.counters);
         const auto drawn_at = Clock::now();
+        if (span.keep) result.kept.keep(ray, span.first + chunk.first + drawn, batch, mine.block.values);
         mine.errors.resize(batch * outputs);
         for (std::size_t o = 0; o < outputs; ++o) {
           const Real target = targets.mean[ray * outputs + o];

@@ -6,6 +6,7 @@
 
 #include "harness/gate.h"
 #include "harness/moments.h"
+#include "harness/replays.h"
 #include "harness/scene.h"
 #include "harness/targets.h"
 
@@ -23,6 +24,7 @@ struct Sampled {
   std::uint64_t nonfinite = 0, out_of_range = 0;
   Real largest = 0;                ///< max |X| of the finite samples
   std::vector<Evidence> evidence;  ///< one per test of the gate
+  KeptSamples kept;                ///< where the span asks for them
   /// Of all threads: evidence alone; all that is done with samples once they are drawn; everything.
   double judging_seconds = 0, statistics_seconds = 0, working_seconds = 0;
 };
@@ -31,6 +33,7 @@ struct Sampled {
 struct SampleSpan {
   std::uint64_t first = 0, per_ray = 0;
   bool only_evidence = false;  ///< moments, groups, blocks and squares of lookups hold nothing
+  bool keep = false;           ///< some values are kept to be drawn again
 };
 
 /// clamp, then quantise, as configured.

@@ -1,3 +1,4 @@
+#include "estimators/planted/bin_shape.h"
 #include "estimators/planted/budget.h"
 #include "estimators/planted/channels.h"
 #include "estimators/planted/clamped.h"
@@ -7,6 +8,11 @@
 #include "estimators/planted/decomposition.h"
 #include "estimators/planted/decomposition_reset.h"
 #include "estimators/planted/flight_rate.h"
+#include "estimators/planted/half_depth.h"
+#include "estimators/planted/killed.h"
+#include "estimators/planted/learned_bound.h"
+#include "estimators/planted/medium_average.h"
+#include "estimators/planted/midpoint.h"
 #include "estimators/planted/mis.h"
 #include "estimators/planted/moments.h"
 #include "estimators/planted/neighbour.h"
@@ -16,14 +22,17 @@
 #include "estimators/planted/rare_nan.h"
 #include "estimators/planted/roulette.h"
 #include "estimators/planted/segments.h"
+#include "estimators/planted/slight.h"
 #include "estimators/planted/spectral.h"
 #include "estimators/planted/streams.h"
+#include "estimators/planted/unit_length.h"
 #include "estimators/planted/weighted.h"
 #include "harness/registry.h"
 
 namespace nullmark {
 
 NULLMARK_REGISTER_PLANTED_BUG(PlantedBatchStreams, WrappedSource<PlantedBatchStreams>);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedBinShape);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedBudget);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedCappedExtinction);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedCarriedDistance);
@@ -40,10 +49,15 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedEarlySurface);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedFirstSegment);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedFlightRate);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedGuidedEscape);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedHalfDepth);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedHeroHistory);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedKilled);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedLastSegment);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedLearnedBound);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedLostEscape);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedLostWalks);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedMediumAverage);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedMidpoint);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedNan);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedNeighbour, WrappedSource<PlantedNeighbour>);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedNoRewind);
@@ -55,11 +69,13 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedReference);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedRoulette);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedSecondLookup);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedSharedOffset);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedSlight);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedSpectralSum);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedStaleResidual);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedStepParenthesis);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedStrictTail);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedTerminalTerm);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedUnitLength);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedUnweightedLevel);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedWeightSign);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedWholeDepth);

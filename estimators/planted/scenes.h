@@ -11,8 +11,10 @@ struct PlantedScene {
   const char* medium;
   const char* majorant;
   const char* rays;
-  Real relative_bias;  ///< (mean - T)/T of channel 0, averaged over the rays; 0 where the bug leaves the mean alone
+  Real relative_bias;  ///< (mean - T)/T of output 0, averaged over the rays; 0 where the bug leaves the mean alone
   Real fresh = 1;      ///< share of 300000 samples a ray that do not repeat the random numbers of another
+  const char* quantity = "transmittance";
+  int samples_per_ray = 4096;  ///< at which the check that is named must catch it, or more where the plan allows
 };
 
 inline constexpr const char* kThroughTheBox = R"({"type":"single"})";
@@ -24,6 +26,7 @@ inline constexpr const char* kTooLow = R"({"type":"global","looseness":0.9})";
 inline constexpr const char* kFourCells = R"({"type":"grid","resolution":4,"resolution_y":1,"resolution_z":1})";
 inline constexpr const char* kConstant = R"({"type":"homogeneous","extinction":1})";
 inline constexpr const char* kRising = R"({"type":"linear","begin":0.5,"end":1.5})";
+inline constexpr const char* kFalling = R"({"type":"exponential","amplitude":3,"rate":-3})";
 inline constexpr const char* kThreeChannels = R"({"type":"homogeneous","extinction":0.5,"spectrum":[1,2,4]})";
 /// Constant along each ray of kSixteenPixels, one period over the image, the same at both its ends.
 inline constexpr const char* kStripes = R"({"type":"cosine","frequency":6.283185307179586,"phase":0})";
@@ -110,6 +113,24 @@ inline constexpr PlantedScene kPlantedScenes[] = {
     {"planted_ray_streams", R"("planted_ray_streams")", kStripes, kTwice, kSixteenPixels, 0, 1. / 16},
     // calls of 16384 samples
     {"planted_batch_streams", R"("planted_batch_streams")", kConstant, kFiveTimes, kThroughTheBox, 0, 16384. / 300000},
+    // every sample has mean T; it depends on those before it
+    {"planted_learned_bound", R"("planted_learned_bound")", kRising, kBound, kThroughTheBox, 0},
+    // bins of a free path have the right shares
+    {"planted_bin_shape", R"("planted_bin_shape")", kConstant, kTwice, kThroughTheBox, 0, 1, "free_path"},
+    {"planted_half_depth", R"("planted_half_depth")", kConstant, kTwice, kThroughTheBox, 0},
+    // e^{-tau/2}/e^{-tau} - 1, tau = 1 over a length of 2
+    {"planted_unit_length", R"("planted_unit_length")", R"({"type":"homogeneous","extinction":0.5,"hi":[2,1,1]})", kBound,
+     R"({"type":"single","to":[2,0.5,0.5]})", 0.648721},
+    // e^{1/2} - 1: the ray's average is 1/2, the medium's 1
+    {"planted_medium_average", R"("planted_medium_average")", R"({"type":"linear","begin":0,"end":2,"axis":"y"})", kBound,
+     R"({"type":"single","from":[0,0.25,0.5],"to":[1,0.25,0.5]})", 0.648721},
+    // .3 of epsilon
+    {"planted_slight", R"("planted_slight")", kConstant, R"({"type":"global","looseness":50})", kThroughTheBox, 0.003, 1,
+     "transmittance", 262144},
+    // -P(N > 5), N Poisson of mean 4
+    {"planted_killed", R"("planted_killed")", kConstant, kFiveTimes, kThroughTheBox, -0.214870},
+    // e^{tau (1 - x/sinh x)} - 1, x = 3/8, tau = 1 - e^{-3}
+    {"planted_midpoint", R"("planted_midpoint")", kFalling, kBound, kThroughTheBox, 0.0221524},
 };
 
 }  // namespace nullmark
