@@ -160,7 +160,7 @@ std::optional<CellGate> gate_of(PreparedCell& prepared, const TestLevels& levels
                    levels);
 }
 
-/// Laws of how the cell's samples and walks behave, where its configuration asks for them.
+/// Laws of how the cell's samples and walks behave, where its configuration asks for them; and what of them is not tested.
 std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
                                std::span<const KeptSamples> kept, std::vector<std::string>& untested,
                                const std::function<bool()>& stop) {
@@ -606,9 +606,11 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     return outcome;
   }
   const auto progress = [&](double fraction) { observer.progress(record, fraction); };
-  const std::optional<CellGate> gate = gate_of(prepared, TestLevels{plan.levels.alpha_pass, families.means}, stop);
-  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                                   {0, prepared.samples_per_ray}, gate ? &*gate : nullptr, stop, progress);
+  std::vector<KeptSamples> kept;
+  const std::optional<CellGate> gate = gate_of(prepared, TestLevels{plan.levels.alpha_pass, families.means}, kept, stop);
+  const auto sampled =
+      sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
+                  {.per_ray = prepared.samples_per_ray, .keep = gate.has_value()}, gate ? &*gate : nullptr, stop, progress);
   if (sampled) outcome.effort += *sampled;
   if (sampled && sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   std::optional<VerdictRecord> verdict;
@@ -628,10 +630,12 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     record.status = Status::error;
     record.reason = fmt::format("{} walks exceeded the bound on lookups", outcome.effort.overruns);
   }
-  if (record.status == Status::ok)
+  if (record.status == Status::ok) {
     add_verdict(record, prepared, verdict);
-  else
+    record.reliance = measure_reliance(prepared.planned(), *prepared.scene, *prepared.kernel, stop);
+  } else {
     drop_sampled_statistics(record);
+  }
   write_images(record, prepared, *sampled, options, observer);
   return outcome;
 }
