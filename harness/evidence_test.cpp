@@ -12,6 +12,19 @@
 namespace nullmark {
 namespace {
 
+/// Logs of a bet on sums of so many errors.
+std::vector<Real> bet_on(Bet bet, std::span<const Real> sums, int together) {
+  bet.errors_per_sum = together;
+  std::vector<Real> logs(bet.rates.size());
+  nullmark::bet_on(bet, sums, logs);
+  return logs;
+}
+
+Real log_denominator(Bet bet, Real rate, std::uint64_t sums, int together) {
+  bet.errors_per_sum = together;
+  return nullmark::log_denominator(bet, rate, sums);
+}
+
 constexpr Real kMost = std::numeric_limits<Real>::max();
 
 long double factor(const Bet& bet, Real rate, long double sum, int together) {

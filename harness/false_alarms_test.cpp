@@ -219,7 +219,7 @@ class Trial {
         if (test.deterministic)
           evidence_[i].largest_error = std::max(evidence_[i].largest_error, largest);
         else
-          evidence_[i].add(test, sums(static_cast<std::size_t>(test.errors_per_sum)));
+          add(evidence_[i], test);
       }
     }
     samples_ += count;
@@ -252,6 +252,12 @@ class Trial {
   std::uint64_t samples() const { return samples_; }
 
  private:
+  void add(Evidence& evidence, const MeanTest& test) {
+    for (const int length : test.sum_lengths) evidence.bet(test, length, sums(static_cast<std::size_t>(length)));
+    evidence.errors += errors_.size();
+    for (const Real error : errors_) evidence.total_error += error;
+  }
+
   /// Of so many consecutive errors each.
   const std::vector<Real>& sums(std::size_t together) {
     sums_.assign(errors_.size() / together, 0);
@@ -489,38 +495,51 @@ TEST(FalseAlarms, PowerAndCost) {
     Subject single{{row.law}, row.range, epsilon, {row.law.mean() / (1 + bias)}};
     const CellGate gate = gate_of(single, kFirst);
     // The same gate, fed with sums of `together` errors as if each were one.
+    const MeanTest& test = gate.tests[0];
     int together = 1;
     Law summed = row.law;
     constexpr std::size_t kMostValues = 500;
-    while (together < gate.tests[0].errors_per_sum && summed.size() < kMostValues) {
+    while (together < test.sum_lengths[0] && summed.size() < kMostValues) {
       summed = summed.doubled();
       together *= 2;
     }
-    const std::uint64_t most = kPatience * gate.planned;
-    const int draws = gate.tests[0].errors_per_sum / together;
+    const int draws = test.sum_lengths[0] / together;
     const Real mean = single.claimed[0] * together;
     Result result;
-    std::vector<Real> sums;
+    std::vector<Real> sums, longer;
     for (std::uint64_t run = 0; run < std::max<std::uint64_t>(1, runs / kThin); ++run) {
       PlainRng rng = stream(run + 1, 300'000 + static_cast<std::uint64_t>(1e5 * std::abs(bias)));
       Evidence evidence;
       std::uint64_t samples = 0;
-      for (Outcome outcome = Outcome::inconclusive; outcome == Outcome::inconclusive && samples < most;) {
-        const std::uint64_t left = (most - samples + 63) / 64 * 64, count = samples == 0 ? kFirst : std::min(samples, left);
-        for (std::uint64_t todo = count / static_cast<std::uint64_t>(gate.tests[0].errors_per_sum); todo > 0;) {
-          sums.resize(std::min<std::uint64_t>(todo, 4096));
+      for (Outcome outcome = Outcome::inconclusive; outcome == Outcome::inconclusive && samples < 4 * gate.planned;) {
+        // As the program draws: doubled up to the plan, then a quarter more each time.
+        const std::uint64_t wanted = samples < gate.planned ? std::min(samples, gate.planned - samples) : samples / 4;
+        const std::uint64_t count = samples == 0 ? kFirst : (wanted + 63) / 64 * 64;
+        for (std::uint64_t todo = count; todo > 0;) {
+          const std::uint64_t now = std::min<std::uint64_t>(todo, 1 << 16);
+          todo -= now;
+          sums.resize(now / static_cast<std::uint64_t>(test.sum_lengths[0]));
           for (Real& sum : sums) {
             sum = 0;
             for (int i = 0; i < draws; ++i) sum += summed.draw(rng) - mean;
           }
-          evidence.add(gate.tests[0], sums);
-          todo -= sums.size();
+          evidence.bet(test, test.sum_lengths[0], sums);
+          for (std::size_t level = 1; level < test.sum_lengths.size(); ++level) {
+            const auto of = static_cast<std::size_t>(test.sum_lengths[level] / test.sum_lengths[level - 1]);
+            longer.assign(sums.size() / of, 0);
+            for (std::size_t i = 0; i < sums.size(); ++i) longer[i / of] += sums[i];
+            sums = longer;
+            evidence.bet(test, test.sum_lengths[level], sums);
+          }
+          evidence.errors += now;
         }
         samples += count;
         VerdictRecord verdict;
         verdict.against = gate.against;
         verdict.family = kFamily;
-        verdict.tests = {test_record(gate.tests[0], evidence)};
+        verdict.planned = gate.planned;
+        verdict.samples_per_ray = samples;
+        verdict.tests = {test_record(test, evidence)};
         decide(verdict);
         outcome = verdict.unbiased;
         result.fail += outcome == Outcome::fail;

@@ -74,19 +74,22 @@ struct Place {
     }
     add_test(0, MeanTest::kAllRays, 4);
     add_test(0, 0, 1);
-    add_test(0, 1, 16);
+    add_test(0, 1, 4);
     add_test(0, 2, 2);
-    add_test(MeanTest::kLookups, MeanTest::kAllRays, 8);
+    add_test(MeanTest::kLookups, MeanTest::kAllRays, 2);
   }
 
   void add_test(int channel, int group, int errors_per_sum) {
     MeanTest test;
     test.channel = channel;
     test.group = group;
-    test.errors_per_sum = errors_per_sum;
+    std::vector<std::pair<Role, Bet>> bets;
     for (const int side : {1, -1})
-      test.bets.push_back({side > 0 ? Role::high : Role::low, {Bet::Kind::betting, side, 0, 0, {kRate}}});
-    gate.tests.push_back(test);
+      bets.push_back({side > 0 ? Role::high : Role::low, {Bet::Kind::betting, side, 0, 0, {kRate}, errors_per_sum}});
+    // Longer sums are made of the shorter ones.
+    bets.push_back({Role::fail, {Bet::Kind::betting, 1, 0, 0, {kRate}, 4 * errors_per_sum}});
+    test.place(std::move(bets));
+    gate.tests.push_back(std::move(test));
   }
 
   /// Whether a ray's errors enter a test.
@@ -113,23 +116,27 @@ TEST(SampleCell, EveryTestGetsSumsOfAsManyErrorsAsItAsksFor) {
     ASSERT_EQ(sampled.evidence.size(), place.gate.tests.size());
     for (std::size_t i = 0; i < sampled.evidence.size(); ++i) {
       const MeanTest& test = place.gate.tests[i];
-      const auto sums = samples / static_cast<std::uint64_t>(test.errors_per_sum);
-      std::uint64_t expected_sums = 0;
-      std::array<long double, 2> logs{};
+      std::uint64_t errors = 0;
+      std::vector<long double> logs(test.bets.size());
+      long double total = 0;
       for (std::size_t ray = 0; ray < kRays; ++ray) {
         if (!place.takes(test, ray)) continue;
-        expected_sums += sums;
+        errors += samples;
         const long double each = test.channel == MeanTest::kLookups ? 0.25L : static_cast<long double>(error(ray));
-        for (const int side : {1, -1})
-          logs[side < 0] +=
-              static_cast<long double>(sums) * std::log1p(side * static_cast<long double>(kRate) * test.errors_per_sum * each);
+        total += static_cast<long double>(samples) * each;
+        for (std::size_t b = 0; b < test.bets.size(); ++b) {
+          const Bet& bet = test.bets[b].second;
+          logs[b] += static_cast<long double>(samples) / bet.errors_per_sum *
+                     std::log1p(bet.side * static_cast<long double>(kRate) * bet.errors_per_sum * each);
+        }
       }
-      EXPECT_EQ(sampled.evidence[i].sums, expected_sums) << "test " << i << ", " << samples;
-      ASSERT_EQ(sampled.evidence[i].logs.size(), 2u);
-      for (std::size_t side = 0; side < 2; ++side)
-        EXPECT_NEAR(sampled.evidence[i].logs[side], static_cast<Real>(logs[side]),
-                    1e-14 * static_cast<Real>(expected_sums) + 1e-12 * static_cast<Real>(std::abs(logs[side])))
-            << "test " << i << ", side " << side << ", " << samples;
+      EXPECT_EQ(sampled.evidence[i].errors, errors) << "test " << i << ", " << samples;
+      EXPECT_NEAR(sampled.evidence[i].total_error, static_cast<Real>(total), 1e-12 * static_cast<Real>(errors));
+      ASSERT_EQ(sampled.evidence[i].logs.size(), logs.size());
+      for (std::size_t b = 0; b < logs.size(); ++b)
+        EXPECT_NEAR(sampled.evidence[i].logs[b], static_cast<Real>(logs[b]),
+                    1e-14 * static_cast<Real>(errors) + 1e-12 * static_cast<Real>(std::abs(logs[b])))
+            << "test " << i << ", bet " << b << ", " << samples;
     }
   }
 }
@@ -156,9 +163,12 @@ TEST(SampleCell, EveryErrorIsInOneSum) {
           ++errors;
         }
       // What lies beyond the first order, and two roundings of a factor.
-      const Real off = 0.51 * kSmall * test.errors_per_sum * squares + kRounding / kSmall * errors;
-      ASSERT_LT(off, 0.001 * sum);
-      EXPECT_NEAR(sampled.evidence[i].logs[0] / kSmall, sum, off) << "test " << i << ", " << samples;
+      for (std::size_t b = 0; b < test.bets.size(); ++b) {
+        const Bet& bet = test.bets[b].second;
+        const Real off = 0.51 * kSmall * bet.errors_per_sum * squares + kRounding / kSmall * errors;
+        ASSERT_LT(off, 0.001 * sum);
+        EXPECT_NEAR(sampled.evidence[i].logs[b] / kSmall, bet.side * sum, off) << "test " << i << ", " << samples;
+      }
     }
   }
 }
@@ -190,7 +200,7 @@ TEST(SampleCell, EvidenceAloneIsTheSameEvidence) {
     EXPECT_EQ(only.moments[11].count, 0u);
     for (std::size_t i = 0; i < place.gate.tests.size(); ++i) {
       EXPECT_EQ(all.evidence[i].logs, only.evidence[i].logs) << i;
-      EXPECT_EQ(all.evidence[i].sums, only.evidence[i].sums) << i;
+      EXPECT_EQ(all.evidence[i].errors, only.evidence[i].errors) << i;
     }
   }
 }
