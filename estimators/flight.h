@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <type_traits>
 #include <vector>
 
@@ -80,6 +81,7 @@ class Flight {
   void start(const Rates& rates) {
     rates_ = &rates;
     piece_ = 0;
+    collisions_ = 0;
     depth_ = 0;
     position_ = rates.begin();
   }
@@ -87,15 +89,9 @@ class Flight {
   /// Moves to the next tentative collision; false when it lies beyond the ray's end, or where the walk is not `alive`.
   bool next(auto& rng, bool alive) { return alive && next(rng); }
   bool next(auto& rng) {
-    const Real depth = depth_ + rng.exponential();
-    // Most flights stay in their cell: only those that leave it ask for the rule.
-    if (depth < rates_->total_depth() && depth < rates_->depth_after(piece_)) {
-      depth_ = depth;
-      position_ = rates_->position(piece_, depth);
-      return true;
-    }
-    if (rates_->crossing() == Crossing::rewind) return rewind(depth, rng);
-    return advance_to(depth);
+    const bool inside = fly(rng);
+    collisions_ += inside;
+    return inside;
   }
 
   /// Moves forwards to the point of the given depth; false (and the ray's end) when the ray is not that deep.
@@ -115,6 +111,8 @@ class Flight {
 
   Real position() const { return position_; }
   std::size_t piece() const { return piece_; }
+  /// Tentative collisions that `next` has drawn since the flight started.
+  std::uint32_t collisions() const { return collisions_; }
   /// Sampling rate mub at the position, 1/length.
   Real rate() const { return rates_->rate(piece_); }
   /// int rate from the ray's begin to the position, and from the position to the ray's end.
@@ -123,6 +121,18 @@ class Flight {
   Real total_depth() const { return rates_->total_depth(); }
 
  private:
+  bool fly(auto& rng) {
+    const Real depth = depth_ + rng.exponential();
+    // Most flights stay in their cell: only those that leave it ask for the rule.
+    if (depth < rates_->total_depth() && depth < rates_->depth_after(piece_)) {
+      depth_ = depth;
+      position_ = rates_->position(piece_, depth);
+      return true;
+    }
+    if (rates_->crossing() == Crossing::rewind) return rewind(depth, rng);
+    return advance_to(depth);
+  }
+
   /// Cuts a flight to `depth` at the end of its cell, and others after it, until one ends inside its cell or the ray is left.
   [[gnu::noinline]] bool rewind(Real depth, auto& rng) {
     for (;;) {
@@ -139,6 +149,7 @@ class Flight {
 
   const Rates* rates_ = nullptr;
   std::size_t piece_ = 0;
+  std::uint32_t collisions_ = 0;
   Real depth_ = 0, position_ = 0;
 };
 

@@ -211,6 +211,7 @@ class BlockKernel : public Kernel {
             walk.depth = flight.depth();
             walk.total_depth = flight.depth() + flight.depth_left();
             walk.draws = state.rng[k].draws();
+            walk.collisions = flight.collisions();
             if constexpr (kSamplesEvents) {
               const Event<Value> event = estimator_.event(state.walk[k], ray, state.flight[k]);
               walk.end = event.kind;

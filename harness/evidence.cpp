@@ -90,8 +90,8 @@ class Wager {
   static constexpr std::size_t kRates = 2;
 
   /// `least` and `most` of the sums to come.
-  Wager(const Bet& bet, std::span<const Real> rates, int errors_per_sum, Real least, Real most)
-      : kind_(bet.kind), count_(rates.size()), side_(bet.side), neutral_(bet.limit * errors_per_sum) {
+  Wager(const Bet& bet, std::span<const Real> rates, Real least, Real most)
+      : kind_(bet.kind), count_(rates.size()), side_(bet.side), neutral_(bet.limit * bet.errors_per_sum) {
     for (std::size_t r = 0; r < count_; ++r) {
       rate_[r] = rates[r];
       const Real l = rate_[r] * side_;
@@ -198,13 +198,12 @@ std::pair<Real, Real> extent(std::span<const Real> x) {
 
 }  // namespace
 
-std::vector<Real> bet_on(std::span<const Bet* const> bets, std::span<const Real> sums, int errors_per_sum) {
+std::vector<Real> bet_on(std::span<const Bet* const> bets, std::span<const Real> sums) {
   const auto [least, most] = extent(sums);
   std::vector<Wager> wagers;
   for (const Bet* bet : bets)
     for (std::size_t r = 0; r < bet->rates.size(); r += Wager::kRates)
-      wagers.emplace_back(*bet, std::span(bet->rates).subspan(r, std::min(Wager::kRates, bet->rates.size() - r)), errors_per_sum,
-                          least, most);
+      wagers.emplace_back(*bet, std::span(bet->rates).subspan(r, std::min(Wager::kRates, bet->rates.size() - r)), least, most);
   for (std::size_t i = 0; i < sums.size(); i += kBlock)
     for (Wager& wager : wagers) wager.place(sums.subspan(i, std::min(kBlock, sums.size() - i)));
   std::vector<Real> logs;
@@ -212,14 +211,14 @@ std::vector<Real> bet_on(std::span<const Bet* const> bets, std::span<const Real>
   return logs;
 }
 
-std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums, int errors_per_sum) {
+std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums) {
   const Bet* const one = &bet;
-  return bet_on(std::span(&one, 1), sums, errors_per_sum);
+  return bet_on(std::span(&one, 1), sums);
 }
 
-Real log_denominator(const Bet& bet, Real rate, std::uint64_t sums, int errors_per_sum) {
+Real log_denominator(const Bet& bet, Real rate, std::uint64_t sums) {
   if (bet.kind == Bet::Kind::betting) return 0;
-  return static_cast<Real>(sums) * std::log1p(rate * rate * errors_per_sum * bet.variance / 2);
+  return static_cast<Real>(sums) * std::log1p(rate * rate * bet.errors_per_sum * bet.variance / 2);
 }
 
 Real log_mean_exp(std::span<const Real> logs) {

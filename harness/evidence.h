@@ -15,7 +15,7 @@ namespace nullmark {
 ///
 ///   betting  1 + y,  y = l side (S - b limit), where l keeps 1 + y > 0 [Waudby-Smith and Ramdas 2024]
 ///   catoni   exp phi(y) / (1 + l^2 b v / 2),  phi(y) = sgn(y) log(1 + |y| + y^2/2), for variance at most v [Wang and Ramdas
-///   2023]
+///   2023]; phi grows, so a mean further inside the claim wins no more than one at the limit
 ///
 /// Errors of rays with different means may share a bet: the average of factors bounds their geometric mean, so the claim is then
 /// one on the average over the rays.
@@ -26,17 +26,18 @@ struct Bet {
   Real limit = 0;
   Real variance = 0;        ///< v, Catoni only
   std::vector<Real> rates;  ///< l
+  int errors_per_sum = 1;   ///< b
 };
 
 /// log of a bet's wealth at each of its rates, without Catoni's denominator, which depends on the number of sums alone: adding
 /// the logs of shards gives the log of the whole.
-std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums, int errors_per_sum);
+std::vector<Real> bet_on(const Bet& bet, std::span<const Real> sums);
 
 /// The same for several bets on the same sums, one after the other.
-std::vector<Real> bet_on(std::span<const Bet* const> bets, std::span<const Real> sums, int errors_per_sum);
+std::vector<Real> bet_on(std::span<const Bet* const> bets, std::span<const Real> sums);
 
 /// log((1 + l^2 b v/2)^sums) of a Catoni bet at rate l; 0 for a betting one.
-Real log_denominator(const Bet& bet, Real rate, std::uint64_t sums, int errors_per_sum);
+Real log_denominator(const Bet& bet, Real rate, std::uint64_t sums);
 
 /// log of the average of exp(logs); -inf for none.
 Real log_mean_exp(std::span<const Real> logs);

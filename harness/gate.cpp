@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <limits>
 
@@ -10,12 +11,6 @@
 
 namespace nullmark {
 namespace {
-
-/// Rates of the bets, as multiples of epsilon/variance: a mixture over them stands in for the rate that hindsight would pick.
-constexpr Real kFailRates[] = {0.4, 1.5}, kPassRates[] = {0.5, 0.9};
-
-/// Catoni's variance bound over the known variance: quadrature slack, and what PASS concedes ("given Var <= 1.25 sigma^2").
-constexpr Real kFailSlack = 1.02, kPassSlack = 1.25, kPilotSlack = 2;
 
 /// Numbers below have fewer digits than others.
 Real least_of(Precision precision) {
@@ -79,79 +74,8 @@ struct Pool {
   std::size_t rays = 0;
 };
 
-/// `most_per_sum` errors may share a sum.
-void set_bets(MeanTest& test, const Pool& pool, Real low, Real high, bool analytic, int most_per_sum) {
-  const bool bounded_below = std::isfinite(low), bounded_above = std::isfinite(high);
-  const Real below = pool.most - low, above = high - pool.least;  // the largest errors down and up
-  const Real slack = analytic ? 1 : kPilotSlack;
-  const auto place = [&](Role role, Bet::Kind kind, int side, Real limit) {
-    Bet bet{kind, side, limit, 0, {}};
-    bet.variance = test.variance * (analytic ? (role == Role::fail ? kFailSlack : kPassSlack) : slack);
-    const Real scale = test.epsilon / (test.variance * slack);
-    if (role == Role::fail)
-      for (const Real rate : kFailRates) bet.rates.push_back(rate * scale);
-    else
-      for (const Real rate : kPassRates) bet.rates.push_back(rate * scale);
-    test.bets.emplace_back(role, std::move(bet));
-  };
-  using Kind = Bet::Kind;
-  if (!bounded_below || !bounded_above) {
-    place(Role::fail, Kind::catoni, 1, test.reference_error);
-    place(Role::fail, Kind::catoni, -1, -test.reference_error);
-  }
-  if (bounded_below) place(Role::fail, Kind::betting, 1, test.reference_error);
-  if (bounded_above) place(Role::fail, Kind::betting, -1, -test.reference_error);
-  place(Role::low, bounded_below ? Kind::betting : Kind::catoni, 1, -test.epsilon);
-  place(Role::high, bounded_above ? Kind::betting : Kind::catoni, -1, test.epsilon);
-  test.basis = bounded_below && bounded_above ? "betting" : bounded_below || bounded_above ? "catoni+betting" : "catoni";
-
-  // Sums may be as long as a bet at its highest rate still resembles the product over single errors.
-  constexpr Real kSmall = 0.5;
-  int& b = test.errors_per_sum = most_per_sum;
-  for (const auto& placed : test.bets) {
-    const Bet& bet = placed.second;
-    const Real rate = bet.rates.back();
-    const auto fits = [&] {
-      if (bet.kind == Kind::catoni) return b * rate * rate * bet.variance <= kSmall * kSmall;
-      const Real widest = std::max(bounded_below ? below : 0, bounded_above ? above : 0) + std::abs(bet.limit);
-      return b * rate * widest <= kSmall;
-    };
-    while (b > 1 && !fits()) b /= 2;
-  }
-}
-
-/// Without a variance to trust, only bets that need none can be placed.
-void drop_catoni(MeanTest& test) {
-  std::erase_if(test.bets, [](const auto& bet) { return bet.second.kind == Bet::Kind::catoni; });
-}
-
-/// Keeps the wealth of betting bets positive.
-void clip_rates(MeanTest& test, const Pool& pool, Real low, Real high) {
-  for (auto& [role, bet] : test.bets) {
-    if (bet.kind != Bet::Kind::betting) continue;
-    const Real loss = bet.side > 0 ? pool.most - low + bet.limit : high - pool.least - bet.limit;
-    const Real most = loss > 0 ? 0.5 / (loss * test.errors_per_sum) : kInfinity;
-    for (Real& rate : bet.rates) rate = std::min(rate, most);
-  }
-}
-
-/// Samples (over all rays of the test) at which an unbiased cell passes with probability about .95.
-Real samples_to_pass(const MeanTest& test, Real alpha_pass) {
-  constexpr Real kPower = 1.645;
-  const Real margin = test.epsilon - test.reference_error;
-  if (!(margin > 0)) return kInfinity;
-  const Real normal = std::sqrt(2 * std::log(1 / alpha_pass)) + kPower;
-  Real samples = normal * normal * test.variance / (margin * margin);
-  for (const auto& [role, bet] : test.bets) {
-    if (role == Role::fail) continue;
-    const Real v = bet.kind == Bet::Kind::catoni ? bet.variance : test.variance;
-    Real growth = 0;
-    for (const Real l : bet.rates) growth = std::max(growth, l * margin - l * l * v / 2);
-    constexpr Real kSpread = 1.6;  // between the expected wealth and that of 95 of 100 runs
-    samples = std::max(samples, kSpread * std::log(static_cast<Real>(bet.rates.size()) / alpha_pass) / growth);
-  }
-  return samples;
-}
+/// Of an unbiased cell's tests together, beyond the planned chance of a test and where a decision is all but sure.
+constexpr Real kPlannedPower = 1.645, kUnsure = 1e-3;
 
 std::uint64_t per_ray(Real samples, std::size_t rays) {
   const Real each = std::ceil(samples / static_cast<Real>(rays));
@@ -194,147 +118,219 @@ std::vector<int> ray_groups(const BuiltRays& rays) {
   return groups;
 }
 
-void Evidence::add(const MeanTest& test, std::span<const Real> summed) {
+std::vector<int> MeanTest::sum_lengths() const {
+  std::vector<int> lengths;
+  for (const auto& [role, bet] : bets) lengths.push_back(bet.errors_per_sum);
+  std::sort(lengths.begin(), lengths.end());
+  lengths.erase(std::unique(lengths.begin(), lengths.end()), lengths.end());
+  if (lengths.empty()) lengths.push_back(1);
+  return lengths;
+}
+
+void Evidence::bet(const MeanTest& test, int errors_per_sum, std::span<const Real> sums) {
   std::vector<const Bet*> bets;
-  for (const auto& placed : test.bets) bets.push_back(&placed.second);
-  const std::vector<Real> added = bet_on(bets, summed, test.errors_per_sum);
-  logs.resize(std::max(logs.size(), added.size()), 0);
-  for (std::size_t i = 0; i < added.size(); ++i) logs[i] += added[i];
-  sums += summed.size();
+  for (const auto& placed : test.bets)
+    if (placed.second.errors_per_sum == errors_per_sum) bets.push_back(&placed.second);
+  const std::vector<Real> added = bet_on(bets, sums);
+  std::size_t at = 0, next = 0;
+  for (const auto& placed : test.bets) {
+    const std::size_t end = at + placed.second.rates.size();
+    if (logs.size() < end) logs.resize(end, 0);
+    if (placed.second.errors_per_sum == errors_per_sum)
+      for (; at < end; ++at) logs[at] += added[next++];
+    at = end;
+  }
 }
 
 Evidence& Evidence::operator+=(const Evidence& other) {
   logs.resize(std::max(logs.size(), other.logs.size()), 0);
   for (std::size_t i = 0; i < other.logs.size(); ++i) logs[i] += other.logs[i];
-  sums += other.sums;
+  errors += other.errors;
+  total_error += other.total_error;
   largest_error = std::max(largest_error, other.largest_error);
   return *this;
 }
 
-CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Claim claim,
-                   const CellTheory& theory, const std::optional<Pilot>& pilot, const GateLevels& levels) {
-  const std::size_t rays = scene.rays->world.size(), outputs = targets.outputs;
-  CellGate gate;
-  const bool own_mean = claim == Claim::consistent || claim == Claim::biased;
-  gate.against = own_mean ? "own mean" : "reference";
-  gate.group_of = ray_groups(*scene.rays);
-  const int groups = rays < static_cast<std::size_t>(kRayGroups) ? 0 : kRayGroups;
+namespace {
 
-  if (cell.quantity == Quantity::optical_depth || (!scene.bounding && range != SampleRange::binary))
-    range = SampleRange::any_sign;
-  if (range != SampleRange::any_sign) gate.low = 0;
-  if (range == SampleRange::binary || range == SampleRange::unit) gate.high = 1;
+/// Plans the tests of one cell.
+class GatePlanner {
+ public:
+  GatePlanner(const Cell& cell, const Scene& scene, const Targets& targets, Claim claim, const CellTheory& theory,
+              const std::optional<Pilot>& pilot, const GateLevels& levels)
+      : cell_(cell), targets_(targets), theory_(theory), pilot_(pilot), levels_(levels), rays_(scene.rays->world.size()) {
+    const bool own_mean = claim == Claim::consistent || claim == Claim::biased;
+    gate_.against = own_mean ? "own mean" : "reference";
+    gate_.group_of = ray_groups(*scene.rays);
+    gate_.shift.assign(rays_ * targets.outputs, 0);
+    if (own_mean && !theory.ray_shift.empty()) gate_.shift = theory.ray_shift;
+    analytic_ = !theory.ray_variance.empty();
+    gate_.variance_basis = analytic_ ? "analytic" : pilot ? "pilot" : "none";
+    // A free path is drawn, whatever its law is known by.
+    exact_ = claim == Claim::exact && cell.quantity != Quantity::free_path && cell.quantity != Quantity::radiance;
+    most_per_sum_ = static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
+    mean_lookups_ =
+        theory.lookups.value_or(pilot && pilot->samples > 0
+                                    ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples)
+                                    : theory.majorant_depth);
+  }
 
-  const bool analytic = !theory.ray_variance.empty();
-  gate.variance_basis = analytic ? "analytic" : pilot ? "pilot" : "none";
-  gate.shift.assign(rays * outputs, 0);
-  if (own_mean && !theory.ray_shift.empty()) gate.shift = theory.ray_shift;
-  if (!analytic && !pilot) return gate;
+  CellGate plan(SampleRange range, bool bounding) {
+    state_range(range, bounding);
+    allow();
+    if (!analytic_ && !pilot_ && !exact_) return std::move(gate_);
+    for (std::size_t o = 0; o < targets_.outputs; ++o) add_means(o);
+    judge_plan();
+    add_lookups();
+    return std::move(gate_);
+  }
 
-  const int most_per_sum = static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
-  const bool bounded = std::isfinite(gate.low) && std::isfinite(gate.high);
-  const bool distrusted = !analytic && !bounded && (theory.infinite_variance || pilot->variance_of_variance >= kTrustedVariance);
-  std::vector<Pool> pools;
-  const Real ulp = epsilon_of(cell.precision);
-  const Real mean_lookups =
-      theory.lookups.value_or(pilot && pilot->samples > 0 ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples)
-                                                          : theory.majorant_depth);
-  for (std::size_t o = 0; o < outputs; ++o) {
-    std::vector<Pool> by_group(static_cast<std::size_t>(groups) + 1);
-    for (std::size_t ray = 0; ray < rays; ++ray) {
-      const std::size_t at = ray * outputs + o;
-      const Real mean = targets.mean[at] + gate.shift[at];
-      for (Pool* pool : {&by_group[0], groups ? &by_group[static_cast<std::size_t>(gate.group_of[ray]) + 1] : nullptr}) {
-        if (!pool) continue;
-        ++pool->rays;
-        pool->mean += mean;
-        pool->variance += analytic ? theory.ray_variance[at] : pilot->variance[at];
-        pool->reference_error += targets.error[at];
-        pool->least = std::min(pool->least, mean);
-        pool->most = std::max(pool->most, mean);
-      }
+ private:
+  /// Where the majorant does not bound, ranges that rest on it are not claimed.
+  void state_range(SampleRange range, bool bounding) {
+    if (cell_.quantity == Quantity::optical_depth || (!bounding && range != SampleRange::binary)) range = SampleRange::any_sign;
+    if (range != SampleRange::any_sign) gate_.low = 0;
+    if (range == SampleRange::binary || range == SampleRange::unit) gate_.high = 1;
+  }
+
+  /// What the configuration lets a ray cost.
+  void allow() {
+    const std::uint64_t n = cell_.samples_per_ray, most = std::max(n, cell_.gate.max_samples_per_ray);
+    gate_.affordable = most;
+    gate_.allowance = cell_.gate.max_samples_per_ray == 0 ? kPatience * n : most;
+    if (!cell_.gate.max_lookups_per_ray || !(mean_lookups_ > 0)) return;
+    const auto paid = static_cast<std::uint64_t>(std::min<Real>(9e15, *cell_.gate.max_lookups_per_ray / mean_lookups_));
+    gate_.affordable = std::max(n, std::min(most, paid));
+    gate_.allowance = std::max(n, std::min(gate_.allowance, paid));
+  }
+
+  /// A pilot's variance is trusted for bets that rest on it where samples have no range and their variance showed no heavy tail.
+  ErrorLaw::Basis basis() const {
+    if (analytic_) return ErrorLaw::Basis::analytic;
+    const bool trusted = pilot_ && !theory_.infinite_variance && pilot_->variance_of_variance < kTrustedVariance;
+    return trusted ? ErrorLaw::Basis::pilot : ErrorLaw::Basis::none;
+  }
+
+  /// Over all rays, then over each group of them.
+  std::vector<Pool> pools(std::size_t output) const {
+    std::vector<Pool> pools(rays_ < static_cast<std::size_t>(kRayGroups) ? 1 : 1 + kRayGroups);
+    for (std::size_t ray = 0; ray < rays_; ++ray) {
+      const std::size_t at = ray * targets_.outputs + output;
+      const Real mean = targets_.mean[at] + gate_.shift[at];
+      const auto add = [&](Pool& pool) {
+        ++pool.rays;
+        pool.mean += mean;
+        pool.variance += analytic_ ? theory_.ray_variance[at] : pilot_ ? pilot_->variance[at] : 0;
+        pool.reference_error += targets_.error[at];
+        pool.least = std::min(pool.least, mean);
+        pool.most = std::max(pool.most, mean);
+      };
+      add(pools[0]);
+      if (pools.size() > 1) add(pools[static_cast<std::size_t>(gate_.group_of[ray]) + 1]);
     }
-    Real epsilon = 0;
-    for (std::size_t g = 0; g < by_group.size(); ++g) {
-      Pool& pool = by_group[g];
+    for (Pool& pool : pools) pool.mean /= static_cast<Real>(pool.rays);
+    return pools;
+  }
+
+  void add_means(std::size_t output) {
+    const std::vector<Pool> pools = this->pools(output);
+    const Real epsilon = absolute_epsilon(cell_, pools[0].mean);
+    for (std::size_t g = 0; g < pools.size(); ++g) {
+      const Pool& pool = pools[g];
       const auto n = static_cast<Real>(pool.rays);
-      pool.mean /= n;
-      if (g == 0) epsilon = absolute_epsilon(cell, pool.mean);
       MeanTest test;
-      test.channel = static_cast<int>(o);
+      test.channel = static_cast<int>(output);
       test.group = static_cast<int>(g) - 1;
       test.rays = pool.rays;
+      test.reference = pool.mean;
       test.epsilon = g == 0 ? epsilon : epsilon * kGroupMargin;
-      test.reference_error = pool.reference_error / n + single_error(cell, pool.mean, mean_lookups);
+      test.reference_error = pool.reference_error / n + single_error(cell_, pool.mean, mean_lookups_);
       test.variance = pool.variance / n;
-      const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0;
-      test.rounding = std::max(64 * ulp * (1 + mean_lookups + depth) * std::max(std::abs(pool.most), std::abs(pool.least)),
-                               least_of(cell.precision));
+      const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0, ulp = epsilon_of(cell_.precision);
+      test.rounding = std::max(64 * ulp * (1 + mean_lookups_ + depth) * std::max(std::abs(pool.most), std::abs(pool.least)),
+                               least_of(cell_.precision));
       // Rare events that a pilot did not see are no proof of a zero variance.
-      test.deterministic = analytic && !(test.variance > kSurely * test.rounding * test.rounding);
-      if (!analytic && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
+      test.deterministic = exact_ || (analytic_ && !(test.variance > kSurely * test.rounding * test.rounding));
+      if (!analytic_ && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
       // Far below epsilon a variance decides nothing, and theory's may be rounding.
       if (!test.deterministic) test.variance = std::max(test.variance, test.epsilon * test.epsilon / 4);
-      pools.push_back(pool);
-      if (test.deterministic)
-        test.basis = "deterministic";
-      else
-        set_bets(test, pool, gate.low, gate.high, analytic, most_per_sum);
-      if (distrusted) drop_catoni(test);
-      gate.tests.push_back(std::move(test));
+      place(test, {pool.most - gate_.low, gate_.high - pool.least, test.variance, basis(), test.reference_error});
+      demand(test, pool);
+      gate_.tests.push_back(std::move(test));
     }
   }
-  const std::uint64_t most = std::max(cell.samples_per_ray, cell.gate.max_samples_per_ray);
-  gate.affordable = most;
-  if (cell.gate.max_lookups_per_ray && mean_lookups > 0)
-    gate.affordable = std::min(most, static_cast<std::uint64_t>(std::min(9e15, *cell.gate.max_lookups_per_ray / mean_lookups)));
-  gate.affordable = std::max(gate.affordable, cell.samples_per_ray);
 
-  std::optional<std::size_t> hardest;
-  for (std::size_t i = 0; i < gate.tests.size(); ++i) {
-    MeanTest& test = gate.tests[i];
+  void place(MeanTest& test, const ErrorLaw& law) {
+    if (test.deterministic) {
+      test.basis = "deterministic";
+      return;
+    }
+    test.bets = place_bets(law, test.epsilon, cell_.samples_per_ray * test.rays, most_per_sum_);
+    test.basis = basis_of(test.bets);
+    const auto needed = [&](Real power) {
+      return per_ray(errors_to_pass(test.bets, law, test.epsilon, levels_.alpha_pass, power), test.rays);
+    };
+    test.planned = needed(kPlannedPower);
+    // The chance that all tests of the cell are decided is no less than 1 minus the sum of the others.
+    const Real all = static_cast<Real>(targets_.outputs) * static_cast<Real>(rays_ < kRayGroups ? 1 : 1 + kRayGroups);
+    test.sure = needed(boost::math::quantile(complement(boost::math::normal(), kUnsure / all)));
+  }
+
+  /// What the test of a mean asks of the cell.
+  void demand(const MeanTest& test, const Pool& pool) {
     if (test.reference_error > 0.25 * test.epsilon)
-      gate.undecidable =
+      gate_.undecidable =
           fmt::format("the reference's own error {:.2g} is too coarse for epsilon {:.2g}", test.reference_error, test.epsilon);
-    if (test.deterministic || test.bets.empty()) continue;
-    clip_rates(test, pools[i], gate.low, gate.high);
-    test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), test.rays);
-    gate.planned = std::max(gate.planned, test.planned);
-    if (!hardest || test.planned > gate.tests[*hardest].planned) hardest = i;
-  }
-  if (hardest && gate.undecidable.empty()) {
-    const MeanTest& test = gate.tests[*hardest];
+    if (test.deterministic || test.basis == "none") return;
+    gate_.planned = std::max(gate_.planned, test.planned);
+    if (test.sure <= sure_) return;
+    sure_ = test.sure;
     // Relative to a mean that has underflowed nothing can be said.
-    const Real mean = std::max(std::abs(pools[*hardest].mean), least_of(cell.precision));
-    if (kPatience * test.planned > gate.affordable && test.planned > cell.samples_per_ray)
-      gate.undecidable = fmt::format(
-          "PASS at epsilon {:.2g} needs about {:.2g} samples a ray (relative variance {:.2g}) and room for {} times as many; {} "
-          "are allowed",
-          test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean), kPatience, gate.affordable);
+    const Real mean = std::max(std::abs(pool.mean), least_of(cell_.precision));
+    needs_ = fmt::format("not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} (relative variance {:.2g})",
+                         gate_.allowance, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
+    tight_ = fmt::format("perhaps not decidable at {} samples a ray; a PASS at epsilon {:.2g} takes {:.2g} on average and {:.2g} to "
+                         "be sure of it",
+                         gate_.allowance, test.epsilon / mean, static_cast<double>(test.planned), static_cast<double>(test.sure));
   }
-  if (distrusted)
-    gate.undecidable = theory.infinite_variance
-                           ? "the variance is infinite: no number of samples decides the mean"
-                           : fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
-                                         pilot->variance_of_variance);
 
-  // The same machinery for what a sample costs.
-  const bool known_cost = !theory.ray_lookups.empty();
-  const bool known_spread = !theory.ray_lookups_variance.empty();
-  if (known_cost && (known_spread || pilot)) {
-    gate.lookups = theory.ray_lookups;
-    Pool pool;
-    for (std::size_t ray = 0; ray < rays; ++ray) {
-      ++pool.rays;
-      pool.mean += theory.ray_lookups[ray];
-      pool.variance += known_spread ? theory.ray_lookups_variance[ray] : pilot->lookups_variance[ray];
-      pool.least = std::min(pool.least, theory.ray_lookups[ray]);
-      pool.most = std::max(pool.most, theory.ray_lookups[ray]);
+  /// Whether the samples allowed decide the mean, and what is missing where they do not.
+  void judge_plan() {
+    const bool one_sided = std::any_of(gate_.tests.begin(), gate_.tests.end(), [](const MeanTest& test) {
+      const auto has = [&](Role role) {
+        return std::any_of(test.bets.begin(), test.bets.end(), [&](const auto& placed) { return placed.first == role; });
+      };
+      return !test.deterministic && !(has(Role::low) && has(Role::high));
+    });
+    if (one_sided) {
+      gate_.undecidable = theory_.infinite_variance
+                              ? "the variance is infinite: no number of samples decides the mean"
+                              : fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
+                                            pilot_->variance_of_variance);
+      if (!theory_.infinite_variance)
+        gate_.remedies = "state a range of the samples (kRange), their variance (theory), or the guarantee \"exact\"";
+    } else if (gate_.undecidable.empty() && sure_ > gate_.allowance) {
+      gate_.undecidable = gate_.planned > gate_.affordable ? needs_ : tight_;
     }
-    const auto n = static_cast<Real>(rays);
+  }
+
+  /// The same machinery for what a sample costs.
+  void add_lookups() {
+    const bool known_spread = !theory_.ray_lookups_variance.empty();
+    if (theory_.ray_lookups.empty() || !(known_spread || pilot_)) return;
+    gate_.lookups = theory_.ray_lookups;
+    Pool pool;
+    for (std::size_t ray = 0; ray < rays_; ++ray) {
+      pool.mean += theory_.ray_lookups[ray];
+      pool.variance += known_spread ? theory_.ray_lookups_variance[ray] : pilot_->lookups_variance[ray];
+      pool.least = std::min(pool.least, theory_.ray_lookups[ray]);
+      pool.most = std::max(pool.most, theory_.ray_lookups[ray]);
+    }
+    const auto n = static_cast<Real>(rays_);
     MeanTest test;
     test.channel = MeanTest::kLookups;
-    test.rays = rays;
+    test.rays = rays_;
+    test.reference = pool.mean / n;
     constexpr Real kCostEpsilon = 0.01;
     // Expected lookups come from a quadrature as well.
     constexpr Real kTheoryError = 1e-6;
@@ -343,30 +339,47 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
     test.reference_error = kTheoryError * pool.mean / n;
     test.variance = pool.variance / n;
     test.rounding = test.reference_error;
-    const bool seen = known_spread || std::min(pilot->samples, pilot->lookups) >= kTellingLookups;
-    test.deterministic = seen && !(test.variance > kSurely * test.rounding * test.rounding);
+    const bool seen = known_spread || std::min(pilot_->samples, pilot_->lookups) >= kTellingLookups;
+    // Numbers of lookups are not negative: where none is expected every sample makes none.
+    test.deterministic = !(pool.most > 0) || (seen && !(test.variance > kSurely * test.rounding * test.rounding));
     // Numbers of lookups are whole: a mean between two of them varies by at least so much.
     if (!seen) test.variance = std::max(test.variance, pool.mean / n * (1 - std::min<Real>(1, pool.mean / n)));
-    if (test.deterministic) {
-      test.basis = "deterministic";
-    } else {
-      set_bets(test, pool, 0, kInfinity, known_spread, most_per_sum);
-      if (!seen) drop_catoni(test);
-      clip_rates(test, pool, 0, kInfinity);
-      test.planned = per_ray(samples_to_pass(test, levels.alpha_pass), rays);
-    }
-    gate.tests.push_back(std::move(test));
+    using Basis = ErrorLaw::Basis;
+    const Basis basis = known_spread ? Basis::analytic : seen ? Basis::pilot : Basis::none;
+    place(test, {pool.most, kInfinity, test.variance, basis, test.reference_error});
+    gate_.tests.push_back(std::move(test));
   }
-  return gate;
+
+  const Cell& cell_;
+  const Targets& targets_;
+  const CellTheory& theory_;
+  const std::optional<Pilot>& pilot_;
+  const GateLevels& levels_;
+  std::size_t rays_;
+  bool analytic_ = false, exact_ = false;
+  int most_per_sum_ = 1;
+  Real mean_lookups_ = 0;
+  std::uint64_t sure_ = 0;
+  std::string needs_, tight_;
+  CellGate gate_;
+};
+
+}  // namespace
+
+CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Claim claim,
+                   const CellTheory& theory, const std::optional<Pilot>& pilot, const GateLevels& levels) {
+  return GatePlanner(cell, scene, targets, claim, theory, pilot, levels).plan(range, scene.bounding);
 }
 
 TestRecord test_record(const MeanTest& test, const Evidence& evidence) {
   TestRecord record;
   record.channel = test.channel;
   record.group = test.group;
-  record.samples = evidence.sums * static_cast<std::uint64_t>(test.errors_per_sum);
+  record.samples = evidence.errors;
   record.epsilon = test.epsilon;
   record.reference_error = test.reference_error;
+  record.reference = test.reference;
+  if (evidence.errors > 0) record.mean_error = evidence.total_error / static_cast<Real>(evidence.errors);
   record.variance = test.variance;
   record.basis = test.basis;
   record.largest_error = evidence.largest_error;
@@ -377,42 +390,49 @@ TestRecord test_record(const MeanTest& test, const Evidence& evidence) {
   // By role and kind: kinds weigh the same, however many rates each has.
   std::map<std::pair<Role, Bet::Kind>, std::vector<Real>> wealth;
   std::size_t at = 0;
-  for (const auto& [role, bet] : test.bets)
+  for (const auto& [role, bet] : test.bets) {
+    const std::uint64_t sums = evidence.errors / static_cast<std::uint64_t>(bet.errors_per_sum);
     for (const Real rate : bet.rates) {
       const Real log = at < evidence.logs.size() ? evidence.logs[at] : 0;
-      wealth[{role, bet.kind}].push_back(log - log_denominator(bet, rate, evidence.sums, test.errors_per_sum));
+      wealth[{role, bet.kind}].push_back(log - log_denominator(bet, rate, sums));
       ++at;
     }
+  }
   const auto log_e = [&](Role role) {
     std::vector<Real> kinds;
     for (const auto& [key, logs] : wealth)
-      if (key.first == role)
-        kinds.push_back(log_mean_exp(logs));  // Rounded, so that the file tells as much as the decision used.
+      if (key.first == role) kinds.push_back(log_mean_exp(logs));
+    // Rounded, so that the file tells as much as the decision used.
     constexpr Real kDigits = 1e4;
     return std::round(log_mean_exp(kinds) * kDigits) / kDigits;
   };
   record.log_e_fail = log_e(Role::fail);
   record.log_e_low = log_e(Role::low);
   record.log_e_high = log_e(Role::high);
-  if (!test.bets.empty()) record.rates = test.bets.front().second.rates;
+  record.log_e_beyond = log_e(Role::beyond);
+  for (const auto& [role, bet] : test.bets)
+    if (role == Role::fail && bet.side > 0) record.rates.insert(record.rates.end(), bet.rates.begin(), bet.rates.end());
   return record;
 }
+
+/// A test of a mean makes two claims that can be false alarms: "biased" and "beyond epsilon".
+constexpr std::uint64_t kClaims = 2;
 
 std::uint64_t mean_family(const Plan& plan) {
   std::uint64_t tests = 0;
   for (const Cell& cell : plan.cells)
     if (cell.gate.enabled)
       tests += channels_of(plan.media[cell.medium]) * outputs_per_channel(cell.quantity) *
-               (1 + possible_groups(plan.ray_sets[cell.rays]));
+               (1 + possible_groups(plan.ray_sets[cell.rays])) * kClaims;
   return std::max<std::uint64_t>(1, tests);
 }
 
 std::uint64_t lookups_family(const Plan& plan) {
   std::uint64_t tests = 0;
-  for (const Cell& cell : plan.cells) tests += cell.gate.enabled;
+  for (const Cell& cell : plan.cells) tests += kClaims * cell.gate.enabled;
   return std::max<std::uint64_t>(1, tests);
 }
 
-std::uint64_t laws_family(const Plan& plan) { return kLaws * lookups_family(plan); }
+std::uint64_t laws_family(const Plan& plan) { return kLaws * lookups_family(plan) / kClaims; }
 
 }  // namespace nullmark

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/evidence.h"
+#include "harness/bets.h"
 #include "harness/plan.h"
 #include "harness/record.h"
 #include "harness/scene.h"
@@ -19,15 +19,11 @@ struct Targets;
 /// Groups that rays are judged in beside all of them together, since pooled biases cancel: tiles of an image, or runs of a list.
 inline constexpr int kRayGroups = 16;
 
-/// An open verdict may draw this many times the samples at which nearly all are decided.
+/// Where the configuration names no allowance, a cell that is decidable by its samples may draw so many times as many.
 inline constexpr std::uint64_t kPatience = 4;
 
 /// The group of each ray; all 0 where there are too few rays for groups.
 std::vector<int> ray_groups(const BuiltRays& rays);
-
-/// Which of a test's claims a bet is against: "the mean error is 0" (two bets, one a side), "at most -epsilon", "at least
-/// epsilon".
-enum class Role { fail, low, high };
 
 /// One test of a cell: the mean error of a channel over all rays or over one group, or the mean lookups.  Decided before the
 /// first sample is drawn.
@@ -41,10 +37,14 @@ struct MeanTest {
   Real variance = 0;           ///< per sample, averaged over the rays, as theory or a pilot has it
   Real rounding = 0;           ///< errors up to here are rounding
   bool deterministic = false;  ///< no variance beyond rounding: every single sample must be right
-  std::string basis;           ///< "betting", "catoni", "catoni+betting" or "deterministic"
-  std::uint64_t planned = 0;   ///< samples per ray at which PASS is all but certain where there is no bias
-  int errors_per_sum = 1;      ///< b of the bets, a power of two that divides the samples of a ray
-  std::vector<std::pair<Role, Bet>> bets;
+  std::string basis;           ///< see TestRecord
+  Real reference = 0;          ///< expected mean, averaged over the rays
+  std::uint64_t planned = 0;   ///< samples per ray at which the test of an unbiased mean passes with a chance of .95
+  std::uint64_t sure = 0;      ///< the same, where all tests of the cell together do with a chance of .999
+  std::vector<std::pair<Role, Bet>> bets;  ///< on sums of 2^i errors, which divide the samples of a ray
+
+  /// How many errors share a sum, ascending; each divides the next.
+  std::vector<int> sum_lengths() const;
 };
 
 /// What a cell's samples are judged by.
@@ -57,19 +57,22 @@ struct CellGate {
   Real low = -kInfinity, high = kInfinity;  ///< the declared range of samples
   std::string against;                      ///< "reference" or "own mean"
   std::string variance_basis;               ///< "analytic", "pilot" or "none"
-  std::uint64_t planned = 0;                ///< samples per ray, of the most demanding test
+  std::uint64_t planned = 0;                ///< samples per ray, of the most demanding test of the mean
   std::uint64_t affordable = 0;             ///< samples per ray that the configuration allows
-  std::string undecidable;                  ///< why no affordable number of samples decides the mean; empty where one does
+  std::uint64_t allowance = 0;              ///< samples per ray that an undecided cell may draw
+  std::string undecidable;  ///< why an unbiased cell may stay undecided; empty where a thousandth of such do at most
+  std::string remedies;     ///< of a cell in which nothing, or one side only, could be bet: what its estimator could state
 };
 
 /// Evidence of one test so far.
 struct Evidence {
-  std::vector<Real> logs;  ///< bet after bet, rate after rate
-  std::uint64_t sums = 0;
+  std::vector<Real> logs;    ///< bet after bet, rate after rate
+  std::uint64_t errors = 0;  ///< how many there were
+  Real total_error = 0;
   Real largest_error = 0;
 
-  /// Sums of as many errors each as the test asks for.
-  void add(const MeanTest& test, std::span<const Real> summed);
+  /// Bets those that take sums of so many errors on these.
+  void bet(const MeanTest& test, int errors_per_sum, std::span<const Real> sums);
   Evidence& operator+=(const Evidence& other);
 };
 
@@ -89,7 +92,8 @@ CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets,
 /// The figures of a test, ready for the record.
 TestRecord test_record(const MeanTest& test, const Evidence& evidence);
 
-/// Mean tests of a whole configuration, channel by channel and group by group, whatever is selected to run; and lookups tests.
+/// Claims that the mean tests of a whole configuration make, two each, channel by channel and group by group, whatever is
+/// selected to run; and those of its lookups tests.
 std::uint64_t mean_family(const Plan& plan);
 std::uint64_t lookups_family(const Plan& plan);
 

@@ -64,6 +64,7 @@ struct Recording {
     Real depth = 0;                ///< where the flight ended
     Real total_depth = 0;          ///< of the rates it flew through
     std::uint64_t draws = 0;
+    std::uint32_t collisions = 0;       ///< that the flight drew
     EventKind end = EventKind::escape;  ///< of samplers of free paths: how, and how far along the ray, the flight ended
     Real distance = 0;
   };

@@ -218,9 +218,9 @@ class LawTester {
         // The rate that is best at a fixed number of samples and levels from 1e-2 to 1e-12.
         const Real rate = 1 / std::sqrt(static_cast<Real>(y.size()) * list[0]);
         for (const int side : {-1, 1}) {
-          const Bet bet{Bet::Kind::catoni, side, 0, 1.02 * list[0], {3 * rate, 7 * rate}};
-          const std::vector<Real> won = bet_on(bet, y, 1);
-          for (std::size_t r = 0; r < won.size(); ++r) logs.push_back(won[r] - log_denominator(bet, bet.rates[r], y.size(), 1));
+          const Bet bet{Bet::Kind::catoni, side, 0, 1.02 * list[0], {3 * rate, 7 * rate}, 1};
+          const std::vector<Real> won = bet_on(bet, y);
+          for (std::size_t r = 0; r < won.size(); ++r) logs.push_back(won[r] - log_denominator(bet, bet.rates[r], y.size()));
         }
       }
     return log_mean_exp(logs);

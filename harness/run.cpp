@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "harness/background.h"
+#include "harness/counted_lookups.h"
 #include "harness/free_path_law.h"
 #include "harness/image.h"
 #include "harness/laws.h"
@@ -91,8 +92,8 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSam
   // Far beyond the samples of any verdict, so that the streams are others.
   constexpr std::uint64_t kFirst = std::uint64_t{1} << 62;
   const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                                   {.first = kFirst, .per_ray = prepared.samples_per_ray, .about_zero = true, .keep = true},
-                                   nullptr, stop, [](double) {});
+                                   {.first = kFirst, .per_ray = prepared.samples_per_ray, .keep = true}, nullptr, stop,
+                                   [](double) {});
   if (!sampled || prepared.samples_per_ray < 2) return std::nullopt;
   if (sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   Pilot pilot;
@@ -113,7 +114,7 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSam
   }
   pilot.samples = sampled->counters.samples;
   pilot.lookups = sampled->counters.lookups;
-  // Below this share of the raw moment a central one is rounding; one that has underflowed tells nothing.
+  // Below this share of the squared distance to the target a variance is rounding; one that has underflowed tells nothing.
   constexpr Real kCancelled = 1e-6;
   const auto count = n * static_cast<Real>(sampled->lookups.size());
   for (std::size_t o = 0; o < outputs; ++o) {
@@ -137,74 +138,175 @@ std::optional<CellGate> gate_of(PreparedCell& prepared, const GateLevels& levels
   if (!is_judged(prepared)) return std::nullopt;
   const bool spread_missing = !prepared.theory.ray_lookups.empty() && prepared.theory.ray_lookups_variance.empty();
   std::optional<Pilot> pilot;
-  if (prepared.theory.ray_variance.empty() || spread_missing) pilot = run_pilot(prepared, kept, stop);
+  const bool exact = prepared.claim == Claim::exact;
+  if ((prepared.theory.ray_variance.empty() && !exact) || spread_missing) pilot = run_pilot(prepared, kept, stop);
   return plan_gate(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim, prepared.theory, pilot,
                    levels);
 }
 
-/// Looks at the evidence of the planned samples and draws further ones while the verdict is open, as many again each time, up to
-/// four times what the plan foresees and never more than is allowed.  Nothing where interrupted.
+/// Laws of how the cell's samples and walks behave, where its configuration asks for them; and what of them is not tested.
+std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
+                               std::span<const KeptSamples> kept, std::vector<std::string>& untested,
+                               const std::function<bool()>& stop) {
+  std::vector<LawRecord> laws;
+  const LawPolicy policy = prepared.cell->gate.laws;
+  const bool violates = prepared.needs_bound && !prepared.scene->bounding, judged = gate.against == "reference" && !violates;
+  if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !gate.undecidable.empty())))
+    laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range, prepared.theory,
+                     {.each = lookups_of_a_sample(sampled)}, stop);
+  // Bins are coarse; where weights are 1 the distribution itself can be looked at.
+  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path) {
+    const std::string why_not = why_no_free_path_laws(*prepared.scene, prepared.range, prepared.theory);
+    if (!why_not.empty()) untested.push_back("distribution of free paths: " + why_not);
+    for (const LawRecord& law :
+         free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop))
+      laws.push_back(law);
+  }
+  if (const LawRecord law = replay_law(prepared.planned(), *prepared.scene, *prepared.kernel, kept, stop); law.samples > 0)
+    laws.push_back(law);
+  return laws;
+}
+
+/// Whether the samples' own spread says that their mean is off, though nothing could be bet on it; how, in words.
+std::optional<std::string> far_off(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled) {
+  constexpr Real kStandardErrors = 6;
+  const std::size_t outputs = prepared.targets.outputs;
+  for (std::size_t o = 0; o < outputs; ++o) {
+    Real error = 0, squared = 0, expected = 0, rounding = 0;  // of the mean over all rays
+    const auto rays = static_cast<Real>(sampled.lookups.size());
+    for (std::size_t ray = 0; ray < sampled.lookups.size(); ++ray) {
+      const Moments& moments = sampled.moments[ray * outputs + o];
+      error += (moments.mean() - gate.shift[ray * outputs + o]) / rays;
+      expected += (prepared.targets.mean[ray * outputs + o] + gate.shift[ray * outputs + o]) / rays;
+      squared += moments.variance() / (static_cast<Real>(std::max<std::uint64_t>(1, moments.count)) * rays * rays);
+    }
+    for (const MeanTest& test : gate.tests)
+      if (test.channel == static_cast<int>(o) && test.group == MeanTest::kAllRays) rounding = test.rounding + test.reference_error;
+    if (std::abs(error) <= kStandardErrors * std::sqrt(squared) + rounding) continue;
+    const std::string errors =
+        squared > 0 ? fmt::format("{:.3g} standard errors of the samples", std::abs(error) / std::sqrt(squared)) : "and no variance";
+    return fmt::format("mean {:.6g}, expected {:.6g} ({:+.2g}, {})", expected + error, expected, error, errors);
+  }
+  return std::nullopt;
+}
+
+/// Draws on where a verdict is open, as long as the plan and the configuration allow.
+class Judging {
+ public:
+  Judging(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled, const GateLevels& levels,
+          const Families& families)
+      : prepared_(prepared), gate_(gate), evidence_(sampled.evidence), violations_(sampled.counters.violations) {
+    verdict_.against = gate.against;
+    verdict_.variance_basis = gate.variance_basis;
+    verdict_.tolerate = prepared.cell->gate.tolerate;
+    verdict_.family = families.means;
+    verdict_.lookups_family = families.lookups;
+    verdict_.laws_family = families.laws;
+    verdict_.alpha = levels.alpha;
+    verdict_.alpha_pass = levels.alpha_pass;
+    verdict_.planned = gate.planned;
+    verdict_.affordable = gate.affordable;
+    verdict_.planned_undecidable = !gate.undecidable.empty();
+    verdict_.samples_per_ray = prepared.samples_per_ray;
+    verdict_.out_of_range = sampled.out_of_range;
+    open_reason_ = gate.undecidable;
+    if (gate.remedies.empty()) return;
+    if (const auto off = far_off(prepared, gate, sampled)) {
+      verdict_.planned_undecidable = false;
+      open_reason_ = *off + ": " + open_reason_;
+    }
+    open_reason_ += "; " + gate.remedies;
+  }
+
+  void add_laws(std::vector<LawRecord> laws, std::vector<std::string> untested) {
+    verdict_.laws = std::move(laws);
+    verdict_.untested = std::move(untested);
+  }
+  void count_lookups(std::uint64_t walks) { verdict_.counted_walks = walks; }
+
+  const VerdictRecord& decided() {
+    const bool seen = prepared_.scene->exceeds_bound || violations_ > 0;
+    verdict_.violated = prepared_.needs_bound && seen;
+    verdict_.bound_unproven = prepared_.needs_bound && !prepared_.scene->bounding && !seen;
+    verdict_.reason = open_reason_;
+    verdict_.tests.clear();
+    for (std::size_t i = 0; i < gate_.tests.size(); ++i) {
+      verdict_.tests.push_back(test_record(gate_.tests[i], evidence_[i]));
+      if (gate_.tests[i].channel == MeanTest::kLookups && verdict_.counted_walks > 0) verdict_.tests.back().basis = "counted";
+    }
+    decide(verdict_, prepared_.targets.names);
+    return verdict_;
+  }
+
+  /// The samples to draw next of every ray, of a verdict that was just decided; none where it stands.
+  SampleSpan next() const {
+    const std::uint64_t drawn = verdict_.samples_per_ray;
+    if (!open() || drawn >= gate_.allowance) return {};
+    // As many again until the planned ones are drawn; then steps of a quarter overshoot by an eighth.
+    const std::uint64_t wanted = drawn < gate_.planned ? std::min(drawn, gate_.planned - drawn) : drawn / 4;
+    constexpr std::uint64_t kRound = 64;
+    const std::uint64_t count = std::clamp<std::uint64_t>(wanted, 1, gate_.allowance - drawn);
+    return {.first = drawn, .per_ray = (count + kRound - 1) / kRound * kRound, .only_evidence = true};
+  }
+
+  void add(const Sampled& more, std::uint64_t per_ray) {
+    for (std::size_t i = 0; i < evidence_.size(); ++i) evidence_[i] += more.evidence[i];
+    verdict_.samples_per_ray += per_ray;
+    verdict_.out_of_range += more.out_of_range;
+    verdict_.nonfinite += more.nonfinite;
+    violations_ += more.counters.violations;
+  }
+
+ private:
+  /// Whether further samples may decide what is open, and are worth it.
+  bool open() const {
+    const Outcome mean = gate_.against == "own mean" ? verdict_.own_mean : verdict_.unbiased;
+    if (mean == Outcome::inconclusive) {
+      const bool decidable = gate_.remedies.empty() && gate_.planned <= gate_.affordable;
+      return decidable || prepared_.cell->gate.all_samples || promising();
+    }
+    if (mean != Outcome::pass || verdict_.lookups != Outcome::inconclusive) return false;
+    return gate_.tests.back().planned <= gate_.affordable;
+  }
+
+  /// A test of the mean has half the evidence that proves a bias.
+  bool promising() const {
+    const Real needed = std::log(static_cast<Real>(verdict_.family) / verdict_.alpha);
+    return std::any_of(verdict_.tests.begin(), verdict_.tests.end(), [&](const TestRecord& test) {
+      return test.channel >= 0 && test.basis != "deterministic" && test.log_e_fail >= needed / 2;
+    });
+  }
+
+  const PreparedCell& prepared_;
+  const CellGate& gate_;
+  VerdictRecord verdict_;
+  std::vector<Evidence> evidence_;
+  std::uint64_t violations_;
+  std::string open_reason_;
+};
+
+/// Looks at the evidence of the first samples and draws further ones while the verdict is open.  Nothing where interrupted.
 std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
                                    std::span<const KeptSamples> kept, const GateLevels& levels, const Families& families,
                                    Effort& effort, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress) {
-  VerdictRecord verdict;
-  verdict.against = gate.against;
-  verdict.variance_basis = gate.variance_basis;
-  verdict.family = families.means;
-  verdict.lookups_family = families.lookups;
-  verdict.laws_family = families.laws;
-  const LawPolicy policy = prepared.cell->gate.laws;
-  const bool violates = prepared.needs_bound && !prepared.scene->bounding, judged = gate.against == "reference" && !violates;
-  if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !gate.undecidable.empty())))
-    verdict.laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range,
-                             prepared.theory, {.each = lookups_of_a_sample(sampled)}, stop);
-  // Bins are coarse; where weights are 1 the distribution itself can be looked at.
-  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path) {
-    const std::string why_not = why_no_free_path_laws(*prepared.scene, prepared.range, prepared.theory);
-    if (!why_not.empty()) verdict.untested.push_back("distribution of free paths: " + why_not);
-    for (const LawRecord& law :
-         free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop))
-      verdict.laws.push_back(law);
-  }
-  if (const LawRecord law = replay_law(prepared.planned(), *prepared.scene, *prepared.kernel, kept, stop); law.samples > 0)
-    verdict.laws.push_back(law);
-  verdict.alpha = levels.alpha;
-  verdict.alpha_pass = levels.alpha_pass;
-  verdict.planned = gate.planned;
-  verdict.affordable = gate.affordable;
-  verdict.planned_undecidable = !gate.undecidable.empty();
-  verdict.reason = gate.undecidable;
-  verdict.samples_per_ray = prepared.samples_per_ray;
-  std::uint64_t violations = sampled.counters.violations;
-  verdict.out_of_range = sampled.out_of_range;
-  std::uint64_t wanted = 0;
-  for (const MeanTest& test : gate.tests)
-    if (test.planned <= gate.affordable) wanted = std::max(wanted, test.planned);
-  const std::uint64_t most =
-      std::max(prepared.samples_per_ray, std::min(gate.affordable, verdict.planned_undecidable ? 0 : kPatience * wanted));
-  std::vector<Evidence> evidence = sampled.evidence;
+  Judging judging(prepared, gate, sampled, levels, families);
+  std::vector<std::string> untested;
+  std::vector<LawRecord> laws = laws_of(prepared, gate, sampled, kept, untested, stop);
+  judging.add_laws(std::move(laws), std::move(untested));
+  // A mean to a hundredth would take more samples than the rest of the verdict.
+  if (!gate.lookups.empty() && gate.tests.back().planned > std::max(prepared.samples_per_ray, gate.planned))
+    judging.count_lookups(
+        counted_walks(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, levels.alpha_pass, stop));
   for (;;) {
-    verdict.violated = prepared.needs_bound && violations > 0;
-    verdict.tests.clear();
-    for (std::size_t i = 0; i < gate.tests.size(); ++i) verdict.tests.push_back(test_record(gate.tests[i], evidence[i]));
-    decide(verdict, prepared.targets.names);
-    const Outcome mean = gate.against == "own mean" ? verdict.own_mean : verdict.unbiased;
-    const bool open = mean == Outcome::inconclusive || (mean == Outcome::pass && verdict.lookups == Outcome::inconclusive);
-    if (!open || verdict.samples_per_ray >= most) return verdict;
-    constexpr std::uint64_t kRound = 64;
-    const std::uint64_t left = (most - verdict.samples_per_ray + kRound - 1) / kRound * kRound;
-    const SampleSpan span{
-        .first = verdict.samples_per_ray, .per_ray = std::min(verdict.samples_per_ray, left), .only_evidence = true};
+    const VerdictRecord& verdict = judging.decided();
+    const SampleSpan span = judging.next();
+    if (span.per_ray == 0) return verdict;
     const auto more =
         sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, span, &gate, stop, progress);
     if (!more) return std::nullopt;
     effort += *more;
-    for (std::size_t i = 0; i < evidence.size(); ++i) evidence[i] += more->evidence[i];
-    verdict.samples_per_ray += span.per_ray;
-    verdict.out_of_range += more->out_of_range;
-    violations += more->counters.violations;
-    verdict.nonfinite += more->nonfinite;
+    judging.add(*more, span.per_ray);
   }
 }
 
@@ -222,7 +324,7 @@ void foresee(const PreparedCell& prepared, const GateLevels& levels, Prediction&
   const CellGate gate = plan_gate(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim,
                                   prepared.theory, std::nullopt, levels);
   prediction.planned = gate.planned;
-  prediction.most = std::max(prediction.most, std::min(gate.affordable, gate.undecidable.empty() ? kPatience * gate.planned : 0));
+  if (gate.planned <= gate.affordable) prediction.most = std::max(prediction.most, std::min(gate.allowance, kPatience * gate.planned));
   prediction.verdict = prepared.needs_bound && !prepared.scene->bounding ? "VIOLATED"
                        : gate.undecidable.empty()                        ? "PASS"
                                                                          : "INCONCLUSIVE";

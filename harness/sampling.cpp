@@ -51,13 +51,14 @@ struct ChunkResult {
   Clock::duration judging{}, statistics{}, working{};
 };
 
-/// Errors on their way to the tests of a gate: summed in short runs, gathered over rays, and bet on by the thousand.
+/// Errors on their way to the tests of a gate: summed in runs of 2, 4, ... as the bets ask for, gathered over rays, and bet on by
+/// the thousand.
 class Evidences {
  public:
   /// Kept from chunk to chunk: fresh pages cost more than what is written to them.
   struct Memory {
-    std::vector<std::vector<Real>> pending;  ///< by test
-    std::vector<Real> sums;
+    std::vector<std::vector<std::vector<Real>>> pending;  ///< by test and length of its sums
+    std::vector<std::vector<Real>> sums;                  ///< by length
   };
 
   Evidences(const CellGate* gate, std::size_t channels, Memory& memory, std::map<std::size_t, Evidence>& out)
@@ -66,6 +67,9 @@ class Evidences {
     pending_.resize(gate_->tests.size());
     for (std::size_t i = 0; i < gate_->tests.size(); ++i) {
       const MeanTest& test = gate_->tests[i];
+      lengths_.push_back(test.sum_lengths());
+      pending_[i].resize(lengths_.back().size());
+      sums_.resize(std::max(sums_.size(), lengths_.back().size()));
       if (test.channel == MeanTest::kLookups) {
         lookups_ = i;
       } else if (test.group == MeanTest::kAllRays) {
@@ -85,37 +89,52 @@ class Evidences {
       for (const Real error : errors) most = std::max(most, std::abs(error));
       return most;
     };
-    const auto add_to = [&](std::size_t test) {
-      const int together = gate_->tests[test].errors_per_sum;
-      feed(test, together == 1 ? errors : sum(errors, together, 0), largest);
-    };
-    add_to(*pooled_[channel]);
-    if (!grouped_[channel].empty()) add_to(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])]);
+    add_to(*pooled_[channel], errors, 0, largest);
+    if (!grouped_[channel].empty())
+      add_to(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])], errors, 0, largest);
   }
 
   void add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups) {
     if (!gate_ || !lookups_ || lookups.empty()) return;
-    const int together = gate_->tests[*lookups_].errors_per_sum;
     const Real expected = gate_->lookups[ray];
-    feed(*lookups_, sum(lookups, together, expected * together), [&] {
+    add_to(*lookups_, lookups, expected, [&] {
       const auto [least, most] = std::minmax_element(lookups.begin(), lookups.end());
       return std::max(expected - *least, *most - expected);
     });
   }
 
   void finish() {
-    for (std::size_t test = 0; test < pending_.size(); ++test) flush(test);
+    for (std::size_t test = 0; gate_ && test < pending_.size(); ++test)
+      for (std::size_t length = 0; length < pending_[test].size(); ++length) flush(test, length);
   }
 
  private:
   static constexpr std::size_t kTogether = 8192, kEnough = 2048;
 
+  /// Every sum is one of those before it: the shortest of the numbers, less what is expected of each.
+  template <class Number, class Largest>
+  void add_to(std::size_t test, std::span<const Number> numbers, Real expected, Largest largest_error) {
+    const std::vector<int>& lengths = lengths_[test];
+    std::span<const Real> sums = sum(numbers, lengths[0], expected * lengths[0], sums_[0]);
+    feed(test, 0, sums);
+    for (std::size_t i = 1; i < lengths.size(); ++i) {
+      sums = sum(sums, lengths[i] / lengths[i - 1], 0, sums_[i]);
+      feed(test, i, sums);
+    }
+    Evidence& evidence = out_[test];
+    evidence.errors += numbers.size();
+    for (const Real x : sums) evidence.total_error += x;
+    if (gate_->tests[test].deterministic) evidence.largest_error = std::max(evidence.largest_error, largest_error());
+  }
+
   /// Sums of so many numbers each, less what is expected of one.  Which numbers share a sum is free; a stride lets a register of
   /// sums advance together.
   template <class Number>
-  std::span<const Real> sum(std::span<const Number> numbers, int together, Real expected) {
+  static std::span<const Real> sum(std::span<const Number> numbers, int together, Real expected, std::vector<Real>& sums) {
+    if constexpr (std::is_same_v<Number, const Real> || std::is_same_v<Number, Real>)
+      if (together == 1 && expected == 0) return numbers;
     const std::size_t count = numbers.size() / static_cast<std::size_t>(together);
-    sums_.resize(count);
+    sums.resize(count);
     constexpr std::size_t kSideBySide = 64;
     std::array<Real, kSideBySide> run;
     for (std::size_t j = 0; j < count; j += kSideBySide) {
@@ -127,44 +146,40 @@ class Evidences {
           from += count;
           for (std::size_t i = 0; i < n; ++i) run[i] += static_cast<Real>(from[i]);
         }
-        for (std::size_t i = 0; i < n; ++i) sums_[j + i] = run[i] - expected;
+        for (std::size_t i = 0; i < n; ++i) sums[j + i] = run[i] - expected;
       };
       // A width that the compiler knows stays in registers.
       width == kSideBySide ? add(kSideBySide) : add(width);
     }
-    return sums_;
+    return sums;
   }
 
-  template <class Largest>
-  void feed(std::size_t test, std::span<const Real> sums, Largest largest_error) {
-    Evidence& evidence = out_[test];
-    if (gate_->tests[test].deterministic) {
-      evidence.largest_error = std::max(evidence.largest_error, largest_error());
-      evidence.sums += sums.size();
-      return;
-    }
-    std::vector<Real>& waiting = pending_[test];
+  void feed(std::size_t test, std::size_t length, std::span<const Real> sums) {
+    if (gate_->tests[test].bets.empty()) return;
+    std::vector<Real>& waiting = pending_[test][length];
     if (waiting.empty() && sums.size() >= kEnough) {
-      evidence.add(gate_->tests[test], sums);
+      out_[test].bet(gate_->tests[test], lengths_[test][length], sums);
       return;
     }
     waiting.insert(waiting.end(), sums.begin(), sums.end());
-    if (waiting.size() >= kTogether) flush(test);
+    if (waiting.size() >= kTogether) flush(test, length);
   }
 
-  void flush(std::size_t test) {
-    if (pending_[test].empty()) return;
-    out_[test].add(gate_->tests[test], pending_[test]);
-    pending_[test].clear();
+  void flush(std::size_t test, std::size_t length) {
+    std::vector<Real>& waiting = pending_[test][length];
+    if (waiting.empty()) return;
+    out_[test].bet(gate_->tests[test], lengths_[test][length], waiting);
+    waiting.clear();
   }
 
   const CellGate* gate_;
   std::map<std::size_t, Evidence>& out_;
+  std::vector<std::vector<int>> lengths_;                         // of sums, by test
   std::vector<std::optional<std::size_t>> pooled_;                // test by channel
   std::vector<std::vector<std::optional<std::size_t>>> grouped_;  // by channel and group
   std::optional<std::size_t> lookups_;
-  std::vector<std::vector<Real>>& pending_;
-  std::vector<Real>& sums_;
+  std::vector<std::vector<std::vector<Real>>>& pending_;
+  std::vector<std::vector<Real>>& sums_;
 };
 
 std::vector<Chunk> cut(std::size_t rays, std::uint64_t samples, std::uint64_t chunk) {
@@ -289,7 +304,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   const auto take_errors = [&](Scratch& mine, std::size_t o, Real target, std::span<Real> errors,
                                ChunkResult& out) -> std::span<const Real> {
     const std::vector<Real>& values = mine.block.values;
-    const Real reference = span.about_zero ? 0 : measured(target, cell.measurement);
+    const Real reference = measured(target, cell.measurement);
     if (as_drawn) {
       const Real* drawn = values.data();
       if (outputs > 1) {

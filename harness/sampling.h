@@ -32,7 +32,6 @@ struct Sampled {
 /// Which of a cell's samples: first .. first + per_ray - 1 of every ray.
 struct SampleSpan {
   std::uint64_t first = 0, per_ray = 0;
-  bool about_zero = false;     ///< moments of the samples themselves instead of their errors
   bool only_evidence = false;  ///< moments, groups, blocks and squares of lookups hold nothing
   bool keep = false;           ///< some values are kept to be drawn again
 };

@@ -272,6 +272,33 @@ bool bounds_everywhere(const MajorantStructure& majorant, const BuiltRays& rays)
   return true;
 }
 
+bool exceeds_somewhere(const BuiltMedium& built, const MajorantStructure& majorant, const BuiltRays& rays) {
+  const Medium& medium = *built.medium;
+  constexpr int kPoints = 8;
+  SegmentBuffer buffer;
+  std::vector<Real> knots;
+  std::array<Real, kMaxChannels> mu{};
+  for (std::size_t ray = 0; ray < rays.local.size(); ++ray) {
+    const Ray& local = rays.local[ray];
+    majorant.segments(rays.world[ray], local, buffer);
+    for (const Segment& segment : buffer.segments) {
+      // What cannot be above it need not be looked at.
+      if (!exceeds(segment.extinction.maximum.maxCoeff(), segment.majorant)) continue;
+      Ray part = local;
+      part.begin = segment.begin;
+      part.end = segment.end;
+      sorted_knots(medium, part, knots);
+      for (std::size_t i = 0; i + 1 < knots.size(); ++i)
+        for (int k = 0; k < kPoints; ++k) {
+          const Vec3 p = local.at(knots[i] + (knots[i + 1] - knots[i]) * (k + 0.5) / kPoints);
+          medium.extinction({&p.x(), &p.y(), &p.z(), 1}, mu.data());
+          if (exceeds(*std::max_element(mu.begin(), mu.begin() + medium.channels()), segment.majorant)) return true;
+        }
+    }
+  }
+  return false;
+}
+
 std::uint64_t stream_key(const Cell& cell, const BuiltMedium& medium) {
   std::uint64_t key = fnv1a({reinterpret_cast<const char*>(&cell.seed), sizeof cell.seed}, medium.hash);
   if (cell.own_streams) key = fnv1a(cell.estimator.label, key);

@@ -83,6 +83,7 @@ struct Scene {
   std::shared_ptr<const Reference> reference;
   std::shared_ptr<const Marks> marks;  ///< of quantities that are told at distances; null otherwise
   bool bounding = true;                ///< the majorant bounds the extinction in every segment of every ray
+  bool exceeds_bound = false;          ///< the extinction was seen above the majorant at a point of a ray
 
   /// Fills the context of a ray with what the kernel needs.
   void context(std::size_t ray, const Kernel& kernel, RayContext& out) const;
@@ -90,6 +91,10 @@ struct Scene {
 
 /// Whether the majorant bounds the extinction in every segment of every ray.
 bool bounds_everywhere(const MajorantStructure& majorant, const BuiltRays& rays);
+
+/// Whether the extinction exceeds the majorant at one of several points of every piece between the medium's knots and the
+/// segments' ends: then it does not bound, whatever samples happen to meet.
+bool exceeds_somewhere(const BuiltMedium& medium, const MajorantStructure& majorant, const BuiltRays& rays);
 
 /// Key of the random streams: the same for all estimators of a medium and seed, unless the cell asks for streams of its own.
 std::uint64_t stream_key(const Cell& cell, const BuiltMedium& medium);

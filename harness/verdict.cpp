@@ -134,13 +134,12 @@ void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
     reason(*failed, failure(*failed, proven(*failed, alpha, verdict.alpha_pass), alpha));
   } else if (open || !drawn_as_planned) {
     outcome = Outcome::inconclusive;
-    if (!verdict.planned_undecidable) {
-      if (open)
-        reason(*open, fmt::format("undecided after {} samples a ray; {} were planned", verdict.samples_per_ray, verdict.planned));
-      else
-        verdict.reason = fmt::format("within epsilon after {} samples a ray, but {} were planned to look for a smaller bias",
-                                     verdict.samples_per_ray, verdict.planned);
-    }
+    // What the plan knew beforehand says more.
+    if (verdict.reason.empty() && open)
+      reason(*open, fmt::format("undecided after {} samples a ray; {} were planned", verdict.samples_per_ray, verdict.planned));
+    else if (verdict.reason.empty())
+      verdict.reason = fmt::format("within epsilon after {} samples a ray, but {} were planned to look for a smaller bias",
+                                   verdict.samples_per_ray, verdict.planned);
   } else {
     outcome = Outcome::pass;
     verdict.reason.clear();

@@ -164,8 +164,9 @@ std::shared_ptr<const Scene> Workshop::scene(const Cell& cell) {
     if (told_at_marks)
       marks = once(marks_, std::array{cell.medium, cell.rays, kind, cut},
                    [&] { return std::make_shared<const Marks>(compute_marks(*medium, *rays, cell.quantity)); });
-    return std::make_shared<const Scene>(
-        Scene{medium, structure, rays, reference, marks, bounds_everywhere(*structure->structure, *rays)});
+    const bool bounding = bounds_everywhere(*structure->structure, *rays);
+    const bool exceeds = !bounding && exceeds_somewhere(*medium, *structure->structure, *rays);
+    return std::make_shared<const Scene>(Scene{medium, structure, rays, reference, marks, bounding, exceeds});
   });
 }
 
