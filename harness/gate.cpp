@@ -24,6 +24,9 @@ Real single_error(const Cell& cell, Real mean, Real lookups) {
   return 2 * epsilon_of(cell.precision) * std::abs(mean) * (1 + lookups) + least_of(cell.precision);
 }
 
+/// Of epsilon, what rounding may take of a sample.
+constexpr Real kNoBias = 1e-9;
+
 /// Where the standard deviation is a millionth of rounding, no sample in 10^12 shows it, whatever its law [Chebyshev].
 constexpr Real kSurely = 1e-12;
 
@@ -246,9 +249,13 @@ class GatePlanner {
       test.epsilon = g == 0 ? epsilon : epsilon * kGroupMargin;
       test.reference_error = pool.reference_error / n + single_error(cell_, pool.mean, mean_lookups_);
       test.variance = pool.variance / n;
+      // A few hundred samples of one group may lack the rare events that its variance is made of; those of all rays have them.
+      if (!analytic_) test.variance = std::max(test.variance, pools[0].variance / static_cast<Real>(pools[0].rays));
       const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0, ulp = epsilon_of(cell_.precision);
       test.rounding = std::max(64 * ulp * (1 + mean_lookups_ + depth) * std::max(std::abs(pool.most), std::abs(pool.least)),
                                least_of(cell_.precision));
+      // Trackers that divide by the chance of a rare event enlarge rounding; a billionth of epsilon is no bias.
+      test.rounding = std::max(test.rounding, kNoBias * test.epsilon);
       // Rare events that a pilot did not see are no proof of a zero variance.
       test.deterministic = exact_ || (analytic_ && !(test.variance > kSurely * test.rounding * test.rounding));
       if (!analytic_ && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
