@@ -24,6 +24,9 @@ Real single_error(const Cell& cell, Real mean, Real lookups) {
   return 2 * epsilon_of(cell.precision) * std::abs(mean) * (1 + lookups) + least_of(cell.precision);
 }
 
+/// Of epsilon, what rounding may take of a sample.
+constexpr Real kNoBias = 1e-9;
+
 /// Where the standard deviation is a millionth of rounding, no sample in 10^12 shows it, whatever its law [Chebyshev].
 constexpr Real kSurely = 1e-12;
 
@@ -245,9 +248,13 @@ class GatePlanner {
       test.epsilon = g == 0 ? epsilon : epsilon * kGroupMargin;
       test.reference_error = pool.reference_error / n + single_error(cell_, pool.mean, mean_lookups_);
       test.variance = pool.variance / n;
+      // A few hundred samples of one group may lack the rare events that its variance is made of; those of all rays have them.
+      if (!analytic_) test.variance = std::max(test.variance, pools[0].variance / static_cast<Real>(pools[0].rays));
       const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0, ulp = epsilon_of(cell_.precision);
       test.rounding = std::max(64 * ulp * (1 + mean_lookups_ + depth) * std::max(std::abs(pool.most), std::abs(pool.least)),
                                least_of(cell_.precision));
+      // Trackers that divide by the chance of a rare event enlarge rounding; a billionth of epsilon is no bias.
+      test.rounding = std::max(test.rounding, kNoBias * test.epsilon);
       // Rare events that a pilot did not see are no proof of a zero variance.
       test.deterministic = exact_ || (analytic_ && !(test.variance > kSurely * test.rounding * test.rounding));
       if (!analytic_ && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
@@ -287,7 +294,7 @@ class GatePlanner {
     // Relative to a mean that has underflowed nothing can be said.
     const Real mean = std::max(std::abs(pool.mean), least_of(cell_.precision));
     needs_ = fmt::format("not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} (relative variance {:.2g})",
-                         gate_.allowance, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
+                         gate_.affordable, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
     tight_ = fmt::format("perhaps not decidable at {} samples a ray; a PASS at epsilon {:.2g} takes {:.2g} on average and {:.2g} to "
                          "be sure of it",
                          gate_.allowance, test.epsilon / mean, static_cast<double>(test.planned), static_cast<double>(test.sure));
