@@ -43,6 +43,19 @@ class Placing {
     return std::move(bets_);
   }
 
+  std::vector<std::pair<Role, Bet>> blind() {
+    constexpr int kRates = 5;
+    for (const int side : {1, -1}) {
+      Bet bet{Kind::betting, side, side * law_.reference_error, 0, {}, 1};
+      const Real loss = lost(side, bet.limit);
+      if (!std::isfinite(loss) || !(loss > 0)) continue;
+      std::vector<Real> rates;
+      for (Real rate = kMostRisked / (kShortestSum * loss); rates.size() < kRates; rate /= 4) rates.push_back(rate);
+      append(Role::fail, bet, rates);
+    }
+    return std::move(bets_);
+  }
+
  private:
   bool trusted() const { return law_.basis != Basis::none; }
 
@@ -124,6 +137,10 @@ class Placing {
 
 std::vector<std::pair<Role, Bet>> place_bets(const ErrorLaw& law, Real epsilon, std::uint64_t first_look, int most_per_sum) {
   return Placing(law, epsilon, first_look, most_per_sum).all();
+}
+
+std::vector<std::pair<Role, Bet>> place_blind_bets(const ErrorLaw& law, int most_per_sum) {
+  return Placing(law, 0, 0, most_per_sum).blind();
 }
 
 std::string basis_of(const std::vector<std::pair<Role, Bet>>& bets) {

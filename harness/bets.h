@@ -38,6 +38,10 @@ struct ErrorLaw {
 /// best rate would.  Without a first look (0) they end at 1.6.
 std::vector<std::pair<Role, Bet>> place_bets(const ErrorLaw& law, Real epsilon, std::uint64_t first_look, int most_per_sum);
 
+/// Bets against "it is 0" alone, on both bounded sides, for errors of which the variance is not known: squares of errors less the
+/// variance that theory states.  Rates are a quarter of each other, the highest so low that four errors share a sum.
+std::vector<std::pair<Role, Bet>> place_blind_bets(const ErrorLaw& law, int most_per_sum);
+
 /// "betting", "catoni", "catoni+betting", or "none": what the bets rest on.
 std::string basis_of(const std::vector<std::pair<Role, Bet>>& bets);
 

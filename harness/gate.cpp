@@ -184,6 +184,7 @@ class GatePlanner {
     for (std::size_t o = 0; o < targets_.outputs; ++o) add_means(o);
     judge_plan();
     add_lookups();
+    add_variances(range, bounding);
     return std::move(gate_);
   }
 
@@ -354,6 +355,37 @@ class GatePlanner {
     const Basis basis = known_spread ? Basis::analytic : seen ? Basis::pilot : Basis::none;
     place(test, {pool.most, kInfinity, test.variance, basis, test.reference_error});
     gate_.tests.push_back(std::move(test));
+  }
+
+  /// Tests of the variance that theory states, E[(X - mu0)^2] = v: from below for any samples, from above where they have a range.
+  /// Samples of 0 and 1 need none, their variance follows from their mean.
+  void add_variances(SampleRange range, bool bounding) {
+    if (!analytic_ || (range == SampleRange::binary && bounding)) return;
+    for (const MeanTest& mean : gate_.tests) {
+      if (mean.channel < 0 || mean.group != MeanTest::kAllRays || mean.deterministic) continue;
+      Real most = 0, highest = std::isfinite(gate_.high) ? 0 : kInfinity, total = 0, reference = 0;
+      for (std::size_t ray = 0; ray < rays_; ++ray) {
+        const std::size_t at = ray * targets_.outputs + static_cast<std::size_t>(mean.channel);
+        const Real v = theory_.ray_variance[at], mu = targets_.mean[at] + gate_.shift[at];
+        most = std::max(most, v);
+        total += v;
+        reference = std::max(reference, targets_.error[at]);
+        const Real far = std::max(gate_.high - mu, mu - gate_.low);
+        highest = std::max(highest, far * far - v);
+      }
+      // A variance near rounding is one of the tracker's arithmetic.
+      constexpr Real kAboveRounding = 1e4, kTheoryError = 2e-3;
+      if (!(total / static_cast<Real>(rays_) > kAboveRounding * mean.rounding * mean.rounding)) continue;
+      MeanTest test;
+      test.channel = mean.channel;
+      test.rays = rays_;
+      const Real slack = kTheoryError * most + reference * reference + mean.rounding * mean.rounding;
+      test.place(place_blind_bets({most, highest, 0, ErrorLaw::Basis::none, slack}, most_per_sum_));
+      gate_.variances.push_back(std::move(test));
+    }
+    if (!gate_.variances.empty()) gate_.stated_variance = theory_.ray_variance;
+    if (!gate_.variances.empty() && !std::isfinite(gate_.high))
+      gate_.untested.emplace_back("a stated variance that is too large: samples have no upper bound");
   }
 
   const Cell& cell_;

@@ -51,9 +51,8 @@ class Wealth {
 /// All that the walks of the chosen rays tell.
 class LawTester {
  public:
-  LawTester(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets, SampleRange range,
-            const CellTheory& theory)
-      : cell_(cell), scene_(scene), kernel_(kernel), targets_(targets), range_(range), theory_(theory) {
+  LawTester(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets, const CellTheory& theory)
+      : cell_(cell), scene_(scene), kernel_(kernel), theory_(theory) {
     outputs_ = targets.outputs;
     const std::size_t rays = scene.rays->world.size();
     for (std::size_t i = 0; i < std::min(rays, kMostRays); ++i) rays_.push_back(i * rays / std::min(rays, kMostRays));
@@ -83,7 +82,7 @@ class LawTester {
                        cell_.quantity, block, counters);
         workspace->recording = nullptr;
         for (std::size_t i = 0; i < recording.walks.size(); ++i) {
-          take(ray, recording.walks[i], &block.values[i * outputs_]);
+          take(recording.walks[i], &block.values[i * outputs_]);
           now.push_back(centred_flight(recording.walks[i]));
         }
       }
@@ -110,7 +109,6 @@ class LawTester {
       add("independence", log_mean_exp(std::vector{serial_.log(), across_.log()}), pairs_);
     }
     add("conditional", conditional(), conditional_count_);
-    if (!theory_.ray_variance.empty() && varied_ > 0) add("variance", variance_.log(), varied_);
     return records;
   }
 
@@ -130,17 +128,9 @@ class LawTester {
       if (segment.majorant > 0) depth += segment.majorant * (segment.end - segment.begin);
     }
     majorant_depth_ = depth;
-    bound_ = 0;
-    const bool bounded = cell_.quantity == Quantity::transmittance && range_ != SampleRange::any_sign;
-    for (std::size_t c = 0; c < outputs_ && !theory_.ray_variance.empty(); ++c) {
-      const std::size_t at = ray * outputs_ + c;
-      const Real mean = targets_.mean[at] + theory_.ray_shift[at];
-      const bool unit = bounded && (range_ == SampleRange::unit || range_ == SampleRange::binary);
-      bound_ = std::max(bound_, unit ? std::max(mean * mean, (1 - mean) * (1 - mean)) : 0);
-    }
   }
 
-  void take(std::size_t ray, const Recording::Walk& walk, const Real* values) {
+  void take(const Recording::Walk& walk, const Real* values) {
     const std::size_t n = walk.steps.size();
     const Real flown = std::min(walk.depth, walk.total_depth);
     collisions_ += n;
@@ -157,15 +147,6 @@ class LawTester {
     }
     if (n > 0 && walk.total_depth > 0) first_.push_back(std::expm1(-walk.steps[0].depth) / std::expm1(-walk.total_depth));
     by_count(n, values);
-    if (theory_.ray_variance.empty()) return;
-    for (std::size_t c = 0; c < outputs_; ++c) {
-      const std::size_t at = ray * outputs_ + c;
-      const Real v = theory_.ray_variance[at], mean = targets_.mean[at] + theory_.ray_shift[at];
-      if (!(bound_ > 0) || !(v > kNoVariance * mean * mean)) continue;
-      const Real error = values[c] - mean;
-      variance_.bet((error * error - v) / (2 * bound_));
-      ++varied_;
-    }
   }
 
   Real depth_at(Real position) const {
@@ -237,13 +218,11 @@ class LawTester {
   }
 
   static constexpr std::size_t kMostPositions = 1 << 18, kMostCount = 4096;
-  static constexpr Real kMapping = 1e-9, kNoVariance = 1e-12, kExact = 1e-9, kImpossible = 1e-2;
+  static constexpr Real kMapping = 1e-9, kExact = 1e-9, kImpossible = 1e-2;
 
   const Cell& cell_;
   const Scene& scene_;
   const Kernel& kernel_;
-  const Targets& targets_;
-  SampleRange range_;
   const CellTheory& theory_;
   std::size_t outputs_ = 1;
   std::vector<std::size_t> rays_;
@@ -251,14 +230,14 @@ class LawTester {
 
   std::vector<CountLaw> laws_;                            // of the ray at hand, per channel
   std::vector<Real> depths_;                              // majorant depth at which its segments begin
-  Real majorant_depth_ = 0, bound_ = 0;                   // of the ray; of (X - T)^2 on it
+  Real majorant_depth_ = 0;                               // of the ray
   std::vector<std::vector<std::vector<Real>>> by_count_;  // [ray][count * channels + c]: variance, then samples
 
-  std::uint64_t collisions_ = 0, mapped_ = 0, pairs_ = 0, varied_ = 0, conditional_count_ = 0;
+  std::uint64_t collisions_ = 0, mapped_ = 0, pairs_ = 0, conditional_count_ = 0;
   Real flown_ = 0;
   bool ended_early_ = false, badly_mapped_ = false, impossible_ = false;
   std::vector<Real> first_, all_;
-  Wealth serial_{{0.4, 1.6}}, across_{{0.4, 1.6}}, variance_{{0.1, 0.4, 1.6}};
+  Wealth serial_{{0.4, 1.6}}, across_{{0.4, 1.6}};
 };
 
 /// The rays cut into pieces, about one unit of the thickest channel's depth each, as a scene of its own.
@@ -327,9 +306,7 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
 std::vector<LawRecord> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
                                  SampleRange range, const CellTheory& theory, const LawBudget& budget,
                                  const std::function<bool()>& stop) {
-  // Ranges rest on a true bound.
-  const SampleRange kept = range == SampleRange::binary || scene.bounding ? range : SampleRange::any_sign;
-  LawTester tester(cell, scene, kernel, targets, kept, theory);
+  LawTester tester(cell, scene, kernel, targets, theory);
   if (!tester.run(budget, stop)) return {};
   std::vector<LawRecord> records = tester.records();
   if (cell.quantity == Quantity::transmittance && scene.rays->world.size() > 0)

@@ -16,15 +16,14 @@ inline constexpr Real kCertain = 1e6;
 /// a mean.  Walks are drawn by the cell's own kernel, with streams of their own, and written down.
 ///
 ///   count         collisions against the majorant depth that was flown through: a Poisson process of rate 1 up to the stopping
-///   of
-///                 each walk, so (1 + d)^N e^{-d Lambda} has mean 1 for every d, whatever ends a walk
+///                 of each walk, so (1 + d)^N e^{-d Lambda} has mean 1 for every d, whatever ends a walk
 ///   first         depth of the first collision, given one: uniform in 1 - e^{-depth} [Dvoretzky-Kiefer-Wolfowitz, Massart 1990]
 ///   positions     depths of all collisions of walks that nothing ends: uniform given their number
 ///   mapping       the majorant integrated from the ray's begin to each lookup is the depth the flight says
 ///   conditional   E[X | K = k] and its variance, of products (CountLaw)
 ///   independence  first flights of consecutive samples, and of neighbouring rays, are uncorrelated
+///   variance      (X - mu0)^2 has the mean that theory states; bet on with the samples of the run, see gate.h
 ///   replay        samples drawn again in another order and company are the same bit for bit, see replays.h
-///   variance      (X - T)^2 has the mean that theory states
 ///   kolmogorov_smirnov, chi_square   the law of free paths, see free_path_law.h
 ///   segments      the ray cut into pieces shallow enough for mean tests of their own
 ///

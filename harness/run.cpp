@@ -178,6 +178,13 @@ std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gat
          free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop))
       laws.push_back(law);
   }
+  if (judged && !gate.variances.empty()) {
+    std::vector<Real> logs;
+    for (std::size_t i = 0; i < gate.variances.size(); ++i)
+      logs.push_back(test_record(gate.variances[i], sampled.variances[i]).log_e_fail);
+    laws.push_back({"variance", std::round(log_mean_exp(logs) * 1e4) / 1e4, sampled.counters.samples, Outcome::none});
+    untested = gate.untested;
+  }
   if (const LawRecord law = replay_law(prepared.planned(), *prepared.scene, *prepared.kernel, kept, stop); law.samples > 0)
     laws.push_back(law);
   return laws;

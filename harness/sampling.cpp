@@ -48,6 +48,7 @@ struct ChunkResult {
   std::uint64_t nonfinite = 0, out_of_range = 0;
   Real largest = 0;
   std::map<std::size_t, Evidence> evidence;  ///< by test; a chunk touches few of them
+  std::map<std::size_t, Evidence> variances;
   Clock::duration judging{}, statistics{}, working{};
 };
 
@@ -64,16 +65,26 @@ class Evidences {
       static thread_local Memory memory;
       return memory;
     }
+    static Memory& of_variances() {
+      static thread_local Memory memory;
+      return memory;
+    }
   };
 
-  Evidences(const CellGate* gate, std::size_t channels, Memory& memory, std::map<std::size_t, Evidence>& out)
-      : gate_(gate), out_(out), pooled_(channels), grouped_(channels), pending_(memory.pending), sums_(memory.sums) {
-    if (!gate_) return;
-    pending_.resize(std::max(pending_.size(), gate_->tests.size()));
+  Evidences(const CellGate* gate, std::span<const MeanTest> tests, std::size_t channels, Memory& memory,
+            std::map<std::size_t, Evidence>& out)
+      : gate_(gate),
+        tests_(tests),
+        out_(out),
+        pooled_(channels),
+        grouped_(channels),
+        pending_(memory.pending),
+        sums_(memory.sums) {
+    pending_.resize(std::max(pending_.size(), tests_.size()));
     for (std::vector<std::vector<Real>>& lengths : pending_)
       for (std::vector<Real>& waiting : lengths) waiting.clear();  // of a run that was stopped
-    for (std::size_t i = 0; i < gate_->tests.size(); ++i) {
-      const MeanTest& test = gate_->tests[i];
+    for (std::size_t i = 0; i < tests_.size(); ++i) {
+      const MeanTest& test = tests_[i];
       const std::size_t lengths = test.sum_lengths.size();
       pending_[i].resize(std::max(pending_[i].size(), lengths));
       sums_.resize(std::max(sums_.size(), lengths));
@@ -90,7 +101,7 @@ class Evidences {
   }
 
   void add_errors(std::size_t ray, std::size_t channel, std::span<const Real> errors) {
-    if (!gate_ || !pooled_[channel]) return;
+    if (!pooled_[channel]) return;
     const auto largest = [&] {
       Real most = 0;
       for (const Real error : errors) most = std::max(most, std::abs(error));
@@ -102,7 +113,7 @@ class Evidences {
   }
 
   void add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups) {
-    if (!gate_ || !lookups_ || lookups.empty()) return;
+    if (!lookups_ || lookups.empty()) return;
     const Real expected = gate_->lookups[ray];
     add_to(*lookups_, lookups, expected, [&] {
       const auto [least, most] = std::minmax_element(lookups.begin(), lookups.end());
@@ -111,8 +122,8 @@ class Evidences {
   }
 
   void finish() {
-    for (std::size_t test = 0; gate_ && test < gate_->tests.size(); ++test)
-      for (std::size_t length = 0; length < gate_->tests[test].sum_lengths.size(); ++length) flush(test, length);
+    for (std::size_t test = 0; test < tests_.size(); ++test)
+      for (std::size_t length = 0; length < tests_[test].sum_lengths.size(); ++length) flush(test, length);
   }
 
  private:
@@ -121,7 +132,7 @@ class Evidences {
   /// Every sum is one of those before it: the shortest of the numbers, less what is expected of each.
   template <class Number, class Largest>
   void add_to(std::size_t test, std::span<const Number> numbers, Real expected, Largest largest_error) {
-    const std::vector<int>& lengths = gate_->tests[test].sum_lengths;
+    const std::vector<int>& lengths = tests_[test].sum_lengths;
     std::span<const Real> sums = sum(numbers, lengths[0], expected * lengths[0], sums_[0]);
     feed(test, 0, sums);
     for (std::size_t i = 1; i < lengths.size(); ++i) {
@@ -131,7 +142,7 @@ class Evidences {
     Evidence& evidence = out_[test];
     evidence.errors += numbers.size();
     for (const Real x : sums) evidence.total_error += x;
-    if (gate_->tests[test].deterministic) evidence.largest_error = std::max(evidence.largest_error, largest_error());
+    if (tests_[test].deterministic) evidence.largest_error = std::max(evidence.largest_error, largest_error());
   }
 
   /// Sums of so many numbers each, less what is expected of one.  Which numbers share a sum is free; a stride lets a register of
@@ -162,10 +173,10 @@ class Evidences {
   }
 
   void feed(std::size_t test, std::size_t length, std::span<const Real> sums) {
-    if (gate_->tests[test].bets.empty()) return;
+    if (tests_[test].bets.empty()) return;
     std::vector<Real>& waiting = pending_[test][length];
     if (waiting.empty() && sums.size() >= kEnough) {
-      out_[test].bet(gate_->tests[test], gate_->tests[test].sum_lengths[length], sums);
+      out_[test].bet(tests_[test], tests_[test].sum_lengths[length], sums);
       return;
     }
     waiting.insert(waiting.end(), sums.begin(), sums.end());
@@ -175,11 +186,12 @@ class Evidences {
   void flush(std::size_t test, std::size_t length) {
     std::vector<Real>& waiting = pending_[test][length];
     if (waiting.empty()) return;
-    out_[test].bet(gate_->tests[test], gate_->tests[test].sum_lengths[length], waiting);
+    out_[test].bet(tests_[test], tests_[test].sum_lengths[length], waiting);
     waiting.clear();
   }
 
   const CellGate* gate_;
+  std::span<const MeanTest> tests_;
   std::map<std::size_t, Evidence>& out_;
   std::vector<std::optional<std::size_t>> pooled_;                // test by channel
   std::vector<std::vector<std::optional<std::size_t>>> grouped_;  // by channel and group
@@ -287,6 +299,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   result.groups.resize(outputs);
 
   if (gate) result.evidence.resize(gate->tests.size());
+  if (gate) result.variances.resize(gate->variances.size());
   if (span.keep) result.kept = KeptSamples(rays, span.first, span.per_ray, outputs);
 
   std::vector<ChunkResult> results(chunks.size());
@@ -351,7 +364,11 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     out.blocks.resize(outputs);
     out.group_sums.assign(outputs, 0);
     const auto begun = Clock::now();
-    Evidences evidences(gate, outputs, Evidences::Memory::of_this_thread(), out.evidence);
+    const bool varies = gate && !gate->variances.empty() && !span.only_evidence;
+    const std::span<const MeanTest> tests = gate ? gate->tests : std::span<const MeanTest>();
+    Evidences evidences(gate, tests, outputs, Evidences::Memory::of_this_thread(), out.evidence);
+    Evidences variances(gate, varies ? gate->variances : std::span<const MeanTest>(), outputs, Evidences::Memory::of_variances(),
+                        out.variances);
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
       scene.context(ray, kernel, mine.context);
       kernel.begin_ray(*mine.workspace, *scene.medium->medium, scene.medium->extrema, mine.context);
@@ -380,6 +397,9 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
           if (const Real shift = gate->shift[ray * outputs + o]; shift != 0)
             for (Real& error : errors) error -= shift;
           evidences.add_errors(ray, o, errors);
+          if (!varies) continue;
+          for (Real& error : errors) error = error * error - gate->stated_variance[ray * outputs + o];
+          variances.add_errors(ray, o, errors);
         }
         evidences.add_lookups(ray, mine.block.lookups);
         const auto judged_at = Clock::now();
@@ -395,6 +415,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     }
     const auto drawn_at = Clock::now();
     evidences.finish();
+    variances.finish();
     const auto judged_at = Clock::now();
     out.statistics += judged_at - drawn_at;
     out.judging += judged_at - drawn_at;
@@ -429,6 +450,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     result.judging_seconds += std::chrono::duration<double>(part.judging).count();
     result.working_seconds += std::chrono::duration<double>(part.working).count();
     for (const auto& [test, evidence] : part.evidence) result.evidence[test] += evidence;
+    for (const auto& [test, evidence] : part.variances) result.variances[test] += evidence;
   }
   if (span.per_ray > whole_chunk && !span.only_evidence) {
     // A chunk's own groups already hold the level at which the chunks begin.
