@@ -5,7 +5,7 @@
 namespace nullmark {
 
 /// A midpoint march that claims to be unbiased, with samples of any sign and no theory.  All lookups of a sample lie off the
-/// midpoints by one offset, uniform within .0005 of a step, so samples hardly vary and none of them tells how wrong the mean is.
+/// midpoints by one offset, uniform within 5e-6 of a step, so samples hardly vary and none of them tells how wrong the mean is.
 template <class Value>
 struct PlantedMidpoint {
   static constexpr const char* kName = "planted_midpoint";
@@ -17,7 +17,7 @@ struct PlantedMidpoint {
   static constexpr const char* kCaughtBy = "open";
 
   static constexpr int kSteps = 4;
-  static constexpr Real kJitter = 1e-3;
+  static constexpr Real kJitter = 1e-5;
 
   Claim claim(Quantity) const { return Claim::unbiased; }
 
