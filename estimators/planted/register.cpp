@@ -24,6 +24,7 @@
 #include "estimators/planted/segments.h"
 #include "estimators/planted/slight.h"
 #include "estimators/planted/spectral.h"
+#include "estimators/planted/stated.h"
 #include "estimators/planted/streams.h"
 #include "estimators/planted/unit_length.h"
 #include "estimators/planted/weighted.h"
@@ -46,6 +47,7 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedDecompositionMarginal);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedDecompositionReset);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedDecompositionStart);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedEarlySurface);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedExact);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedFirstSegment);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedFlightRate);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedGuidedEscape);
@@ -77,6 +79,7 @@ NULLMARK_REGISTER_PLANTED_BUG(PlantedStrictTail);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedTerminalTerm);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedUnitLength);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedUnweightedLevel);
+NULLMARK_REGISTER_PLANTED_BUG(PlantedVariance);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedWeightSign);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedWholeDepth);
 NULLMARK_REGISTER_PLANTED_BUG(PlantedZero);

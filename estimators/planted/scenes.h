@@ -131,6 +131,9 @@ inline constexpr PlantedScene kPlantedScenes[] = {
     {"planted_killed", R"("planted_killed")", kConstant, kFiveTimes, kThroughTheBox, -0.214870},
     // e^{tau (1 - x/sinh x)} - 1, x = 3/8, tau = 1 - e^{-3}
     {"planted_midpoint", R"("planted_midpoint")", kFalling, kBound, kThroughTheBox, 0.0221524},
+    {"planted_variance", R"("planted_variance")", kConstant, kTwice, kThroughTheBox, 0},
+    // every sample, relative
+    {"planted_exact", R"("planted_exact")", kConstant, kBound, kThroughTheBox, 1e-9},
 };
 
 }  // namespace nullmark
