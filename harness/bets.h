@@ -34,8 +34,8 @@ struct ErrorLaw {
 ///
 /// Rates l, in units of epsilon/v: a PASS is planned for one, .69, which is best at the planned number of samples, and less where
 /// it would risk too much at once.  A bias may be of any size: rates against "0" double from .4 up to what the first look makes
-/// the best for the least bias that it could prove at all, `first_look` errors.  No bias in between earns less than .89 of what its
-/// best rate would.  Without a first look (0) they end at 1.6.
+/// the best for the least bias that it could prove at all, `first_look` errors.  No bias in between earns less than .89 of what
+/// its best rate would.  Without a first look (0) they end at 1.6.
 std::vector<std::pair<Role, Bet>> place_bets(const ErrorLaw& law, Real epsilon, std::uint64_t first_look, int most_per_sum);
 
 /// Bets against "it is 0" alone, on both bounded sides, for errors of which the variance is not known: squares of errors less the
@@ -47,6 +47,7 @@ std::string basis_of(const std::vector<std::pair<Role, Bet>>& bets);
 
 /// Errors at which both one-sided wealths reach 1/alpha_pass with a normal quantile of `power` to spare, where there is no bias;
 /// infinite where nothing can be bet.
-Real errors_to_pass(const std::vector<std::pair<Role, Bet>>& bets, const ErrorLaw& law, Real epsilon, Real alpha_pass, Real power);
+Real errors_to_pass(const std::vector<std::pair<Role, Bet>>& bets, const ErrorLaw& law, Real epsilon, Real alpha_pass,
+                    Real power);
 
 }  // namespace nullmark

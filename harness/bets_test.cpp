@@ -36,7 +36,8 @@ TEST(Bets, NoBiasFallsBetweenTheRates) {
     EXPECT_GE(best_growth(bets, bias), 0.88 * bias * bias / (2 * variance)) << bias / epsilon;
 }
 
-/// A bias of a hundred epsilon at one standard deviation in ten: the first look proves it, where two rates near epsilon/v did not.
+/// A bias of a hundred epsilon at one standard deviation in ten: the first look proves it, where two rates near epsilon/v did
+/// not.
 TEST(Bets, AFirstLookProvesALargeBias) {
   const Real epsilon = 1e-4, bias = 0.0276;
   for (const ErrorLaw& law : {ErrorLaw{.variance = 0.02}, ErrorLaw{.below = 0.5, .above = 0.5, .variance = 0.02}}) {

@@ -90,8 +90,8 @@ TEST(Configs, Seed003RelationsAreMet) {
   }
 }
 
-/// Kozelj's Table 1: corrected within 2 % of theory at 256 x 256, as published within 4 % of the printed values; that picture has a
-/// quarter of its pixels here, which leaves its errors what they are (claim C09 has all of them).
+/// Kozelj's Table 1: corrected within 2 % of theory at 256 x 256, as published within 4 % of the printed values; that picture has
+/// a quarter of its pixels here, which leaves its errors what they are (claim C09 has all of them).
 TEST(Configs, Seed004TableIsReproducedAndCorrected) {
   Plan plan = shipped("seed_004_table1.json");
   for (Component& rays : plan.ray_sets)

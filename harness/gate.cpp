@@ -171,10 +171,9 @@ class GatePlanner {
     exact_ = claim == Claim::exact && cell.quantity != Quantity::free_path && cell.quantity != Quantity::radiance;
     most_per_sum_ = static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
     gate_.longest_sum = static_cast<std::uint64_t>(most_per_sum_);
-    mean_lookups_ =
-        theory.lookups.value_or(pilot && pilot->samples > 0
-                                    ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples)
-                                    : theory.majorant_depth);
+    mean_lookups_ = theory.lookups.value_or(pilot && pilot->samples > 0
+                                                ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples)
+                                                : theory.majorant_depth);
   }
 
   CellGate plan(SampleRange range, bool bounding) {
@@ -296,9 +295,10 @@ class GatePlanner {
     const Real mean = std::max(std::abs(pool.mean), least_of(cell_.precision));
     needs_ = fmt::format("not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} (relative variance {:.2g})",
                          gate_.affordable, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
-    tight_ = fmt::format("perhaps not decidable at {} samples a ray; a PASS at epsilon {:.2g} takes {:.2g} on average and {:.2g} to "
-                         "be sure of it",
-                         gate_.allowance, test.epsilon / mean, static_cast<double>(test.planned), static_cast<double>(test.sure));
+    tight_ = fmt::format(
+        "perhaps not decidable at {} samples a ray; a PASS at epsilon {:.2g} takes {:.2g} on average and {:.2g} to "
+        "be sure of it",
+        gate_.allowance, test.epsilon / mean, static_cast<double>(test.planned), static_cast<double>(test.sure));
   }
 
   /// Whether the samples allowed decide the mean, and what is missing where they do not.
@@ -310,10 +310,11 @@ class GatePlanner {
       return !test.deterministic && !(has(Role::low) && has(Role::high));
     });
     if (one_sided) {
-      gate_.undecidable = theory_.infinite_variance
-                              ? "the variance is infinite: no number of samples decides the mean"
-                              : fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
-                                            pilot_->variance_of_variance);
+      gate_.undecidable =
+          theory_.infinite_variance
+              ? "the variance is infinite: no number of samples decides the mean"
+              : fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
+                            pilot_->variance_of_variance);
       if (!theory_.infinite_variance)
         gate_.remedies = "state a range of the samples (kRange), their variance (theory), or the guarantee \"exact\"";
     } else if (gate_.undecidable.empty() && sure_ > gate_.allowance) {
@@ -357,8 +358,8 @@ class GatePlanner {
     gate_.tests.push_back(std::move(test));
   }
 
-  /// Tests of the variance that theory states, E[(X - mu0)^2] = v: from below for any samples, from above where they have a range.
-  /// Samples of 0 and 1 need none, their variance follows from their mean.
+  /// Tests of the variance that theory states, E[(X - mu0)^2] = v: from below for any samples, from above where they have a
+  /// range. Samples of 0 and 1 need none, their variance follows from their mean.
   void add_variances(SampleRange range, bool bounding) {
     if (!analytic_ || (range == SampleRange::binary && bounding)) return;
     for (const MeanTest& mean : gate_.tests) {

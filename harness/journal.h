@@ -8,8 +8,8 @@
 namespace nullmark {
 
 /// The cells of a run under way, one line each, beside the results file that will hold them: RESULTS.journal.  Every line reaches
-/// the disk before `append` returns, so a run that is killed loses at most the cells it was at.  The open journal is also the lock
-/// that keeps a second run off the same results.
+/// the disk before `append` returns, so a run that is killed loses at most the cells it was at.  The open journal is also the
+/// lock that keeps a second run off the same results.
 class Journal {
  public:
   enum class Mode {

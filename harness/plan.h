@@ -86,7 +86,7 @@ enum class Tolerate { nothing, epsilon };
 /// What a cell's verdict must prove and what that may cost.
 struct GateSpec {
   bool enabled = true;
-  std::optional<Real> epsilon{};              ///< relative to the mean reference; left out: by the optical depth, see gate.cpp
+  std::optional<Real> epsilon{};  ///< relative to the mean reference; left out: by the optical depth, see gate.cpp
   /// Where undecided; 0: samples_per_ray, and up to four times as many where they were enough by the plan.
   std::uint64_t max_samples_per_ray = 0;
   std::optional<Real> max_lookups_per_ray{};  ///< expected lookups that all samples of a ray may cost

@@ -92,27 +92,27 @@ struct VerdictRecord {
   /// themselves, which proves nothing about T.
   Outcome unbiased = Outcome::none, own_mean = Outcome::none;
   Outcome lookups = Outcome::none;
-  std::string reason;                         ///< of an INCONCLUSIVE, or what fails
-  std::string proves;                         ///< what a PASS proves: "|bias| < 0.37 % of the mean"
+  std::string reason;  ///< of an INCONCLUSIVE, or what fails
+  std::string proves;  ///< what a PASS proves: "|bias| < 0.37 % of the mean"
   Tolerate tolerate = Tolerate::nothing;
   bool within = false, beyond = false, biased = false;  ///< what is proven of the mean error: see verdict.h
-  std::string against;                        ///< "reference", or "own mean" of an estimator that predicts its bias
-  std::string variance_basis;                 ///< "analytic", "pilot" or "none"
-  bool planned_undecidable = false;           ///< the plan said beforehand that no affordable number of samples decides
-  bool violated = false;                      ///< needs a true majorant, and the extinction was seen above it
-  bool bound_unproven = false;                ///< the majorant is not known to bound, and nothing was seen above it
-  std::uint64_t counted_walks = 0;            ///< whose lookups were found to be their collisions, one by one
-  std::uint64_t nonfinite = 0;                ///< among the samples beyond the planned ones
-  std::uint64_t out_of_range = 0;             ///< samples outside the range the estimator declares
-  std::uint64_t samples_per_ray = 0;          ///< used in the end
-  std::uint64_t planned = 0, affordable = 0;  ///< samples per ray
+  std::string against;                                  ///< "reference", or "own mean" of an estimator that predicts its bias
+  std::string variance_basis;                           ///< "analytic", "pilot" or "none"
+  bool planned_undecidable = false;                     ///< the plan said beforehand that no affordable number of samples decides
+  bool violated = false;                                ///< needs a true majorant, and the extinction was seen above it
+  bool bound_unproven = false;                          ///< the majorant is not known to bound, and nothing was seen above it
+  std::uint64_t counted_walks = 0;                      ///< whose lookups were found to be their collisions, one by one
+  std::uint64_t nonfinite = 0;                          ///< among the samples beyond the planned ones
+  std::uint64_t out_of_range = 0;                       ///< samples outside the range the estimator declares
+  std::uint64_t samples_per_ray = 0;                    ///< used in the end
+  std::uint64_t planned = 0, affordable = 0;            ///< samples per ray
   std::uint64_t family = 1, lookups_family = 1;
   Real alpha = 1e-4, alpha_pass = 1e-3;
   std::vector<TestRecord> tests;
   std::uint64_t laws_family = 1;
   std::vector<LawRecord> laws;        ///< how samples and walks behave beside their mean: see laws.h
   std::vector<std::string> untested;  ///< what the claims rest on and no law tests, with the reason
-  Outcome lawful = Outcome::none;  ///< PASS: no law is broken
+  Outcome lawful = Outcome::none;     ///< PASS: no law is broken
 };
 
 struct CellRecord {
@@ -124,7 +124,7 @@ struct CellRecord {
   std::string claims, range;
   bool given_depth = false;      ///< the estimator is handed the exact optical depth
   std::optional<Real> reliance;  ///< of such: how much of its answer is that depth, 1 all of it; see reliance.h
-  std::optional<Real> order;  ///< of a consistent estimator's bias in its step
+  std::optional<Real> order;     ///< of a consistent estimator's bias in its step
   int channels = 1;
   std::vector<std::string> outputs;  ///< of quantities with several numbers a channel, what each entry of `channel` is
   std::vector<std::string> effects{"absorption"};

@@ -43,9 +43,8 @@ TEST(ResultsJson, EveryFieldComesBackBitForBit) {
     ASSERT_EQ(a.channel.size(), b.channel.size());
     for (std::size_t c = 0; c < a.channel.size(); ++c) {
       const auto fields = [](const ChannelRecord& r) {
-        return std::vector{r.mean,     r.reference,       r.reference_error,   r.bias,     r.rmse,         r.rmse_theory,
-                           r.variance, r.variance_theory, r.relative_variance, r.kurtosis, r.reference_rms,
-                           r.bias_theory};
+        return std::vector{r.mean,     r.reference,       r.reference_error,   r.bias,     r.rmse,          r.rmse_theory,
+                           r.variance, r.variance_theory, r.relative_variance, r.kurtosis, r.reference_rms, r.bias_theory};
       };
       EXPECT_EQ(fields(a.channel[c]), fields(b.channel[c]));
     }

@@ -93,9 +93,9 @@ Real lookups_of_a_sample(const Sampled& sampled) {
 std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSamples>& kept, const std::function<bool()>& stop) {
   // Far beyond the samples of any verdict, so that the streams are others.
   constexpr std::uint64_t kFirst = std::uint64_t{1} << 62;
-  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                                   {.first = kFirst, .per_ray = prepared.samples_per_ray, .keep = true}, nullptr, stop,
-                                   [](double) {});
+  const auto sampled =
+      sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
+                  {.first = kFirst, .per_ray = prepared.samples_per_ray, .keep = true}, nullptr, stop, [](double) {});
   if (!sampled || prepared.samples_per_ray < 2) return std::nullopt;
   if (sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   Pilot pilot;
@@ -205,12 +205,14 @@ std::optional<std::string> far_off(const PreparedCell& prepared, const CellGate&
       squared += moments.variance() / (static_cast<Real>(std::max<std::uint64_t>(1, moments.count)) * rays * rays);
     }
     for (const MeanTest& test : gate.tests)
-      if (test.channel == static_cast<int>(o) && test.group == MeanTest::kAllRays) rounding = test.rounding + test.reference_error;
+      if (test.channel == static_cast<int>(o) && test.group == MeanTest::kAllRays)
+        rounding = test.rounding + test.reference_error;
     if (std::abs(error) <= kStandardErrors * std::sqrt(squared) + rounding) continue;
     if (std::abs(error) * static_cast<Real>(sampled.counters.samples) <= std::max({Real{1}, sampled.largest, std::abs(expected)}))
       continue;
-    const std::string errors =
-        squared > 0 ? fmt::format("{:.3g} standard errors of the samples", std::abs(error) / std::sqrt(squared)) : "and no variance";
+    const std::string errors = squared > 0
+                                   ? fmt::format("{:.3g} standard errors of the samples", std::abs(error) / std::sqrt(squared))
+                                   : "and no variance";
     return fmt::format("mean {:.6g}, expected {:.6g} ({:+.2g}, {})", expected + error, expected, error, errors);
   }
   return std::nullopt;
@@ -352,7 +354,8 @@ void foresee(const PreparedCell& prepared, const TestLevels& levels, Prediction&
   const CellGate gate = plan_gate(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim,
                                   prepared.theory, std::nullopt, levels);
   prediction.planned = gate.planned;
-  if (gate.planned <= gate.affordable) prediction.most = std::max(prediction.most, std::min(gate.allowance, kPatience * gate.planned));
+  if (gate.planned <= gate.affordable)
+    prediction.most = std::max(prediction.most, std::min(gate.allowance, kPatience * gate.planned));
   prediction.verdict = prepared.needs_bound && !prepared.scene->bounding ? "VIOLATED"
                        : gate.undecidable.empty()                        ? "PASS"
                                                                          : "INCONCLUSIVE";

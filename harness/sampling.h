@@ -22,10 +22,10 @@ struct Sampled {
   std::vector<BlockErrors> blocks;             ///< per output
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
-  Real largest = 0;                ///< max |X| of the finite samples
+  Real largest = 0;                 ///< max |X| of the finite samples
   std::vector<Evidence> evidence;   ///< one per test of the gate
   std::vector<Evidence> variances;  ///< one per variance that the gate tests; none of samples that are evidence alone
-  KeptSamples kept;                ///< where the span asks for them
+  KeptSamples kept;                 ///< where the span asks for them
   /// Of all threads: evidence alone; all that is done with samples once they are drawn; everything.
   double judging_seconds = 0, statistics_seconds = 0, working_seconds = 0;
 };

@@ -194,7 +194,8 @@ Spectrum position_error(const BuiltMedium& medium, const Ray& world, const Ray& 
   if (!(local.length() > 0)) return Spectrum::Zero(medium.medium->channels());
   const Real coordinates = std::max(local.at(local.begin).cwiseAbs().maxCoeff(), local.at(local.end).cwiseAbs().maxCoeff());
   const Real origin = local.origin.cwiseAbs().maxCoeff();
-  const Real lengths = std::max({std::max(coordinates, origin) / local.direction.norm(), std::abs(world.begin), std::abs(world.end)});
+  const Real lengths =
+      std::max({std::max(coordinates, origin) / local.direction.norm(), std::abs(world.begin), std::abs(world.end)});
   return 4 * kEpsilon * lengths * medium.extrema.maximum;
 }
 

@@ -131,7 +131,9 @@ Json definitions() {
       closed_object(
           {{"enabled", {{"type", "boolean"}, {"default", true}}},
            {"epsilon", described(positive(), "|bias| that PASS excludes, relative to the mean reference")},
-           {"max_samples_per_ray", described(whole(0), "drawn while the verdict is open; 0: samples_per_ray, and up to four times as many where the plan says that they are enough")},
+           {"max_samples_per_ray", described(whole(0),
+                                             "drawn while the verdict is open; 0: samples_per_ray, and up to four times as many "
+                                             "where the plan says that they are enough")},
            {"max_lookups_per_ray", described(positive(), "expected lookups that all samples of a ray may cost")},
            {"laws", described({{"enum", law_policies()}},
                               "when the laws of walks are tested: undecided means only where the mean cannot decide")},
@@ -256,8 +258,9 @@ Json cell_schema() {
        {"status",
         {{"enum", {to_string(Status::ok), to_string(Status::skipped), to_string(Status::not_run), to_string(Status::error)}}}},
        {"reason", text},
-       {"reliance", described(nullable("number"), "of an estimator that is handed the exact optical depth: how much of its answer "
-                                                  "follows that depth, 1 all of it")},
+       {"reliance", described(nullable("number"),
+                              "of an estimator that is handed the exact optical depth: how much of its answer "
+                              "follows that depth, 1 all of it")},
        {"mean", statistic("average over the rays")},
        {"reference", object_schema({{"value", statistic("average over the rays")},
                                     {"error", statistic("bound on the reference's own error")},

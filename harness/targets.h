@@ -25,7 +25,8 @@ struct Targets {
 ///                                  albedo (1 - T), where anything scatters; E[w; escape] = T; E[w] = 1
 ///   radiance                       closed form where nothing scatters, and in equilibrium
 ///
-/// What the configuration gives takes the place of those that are not known, or with a larger error; the others it must agree with.
+/// What the configuration gives takes the place of those that are not known, or with a larger error; the others it must agree
+/// with.
 Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quantity,
                         const std::optional<GivenReference>& given = {});
 

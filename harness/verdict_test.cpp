@@ -383,14 +383,16 @@ TEST(Summary, JunitAndMarkdownTellEveryEndOfACell) {
   const std::string xml = junit(run, "it's.json");
   EXPECT_NE(xml.find(R"(tests="5" failures="2" errors="0" skipped="2")"), std::string::npos) << xml;
   EXPECT_NE(xml.find(R"(name="a&lt;b &amp; &quot;c&quot;">)"), std::string::npos) << xml;
-  EXPECT_NE(xml.find("<failure message=\"FAIL: mean 0, expected 0: +0; biased, proven (log E 100.0 &gt; 9.2)"), std::string::npos) << xml;
+  EXPECT_NE(xml.find("<failure message=\"FAIL: mean 0, expected 0: +0; biased, proven (log E 100.0 &gt; 9.2)"), std::string::npos)
+      << xml;
   EXPECT_NE(xml.find("<failure message=\"FAIL: lookups"), std::string::npos) << xml;
   EXPECT_NE(xml.find("<skipped message=\"INCONCLUSIVE: undecided"), std::string::npos) << xml;
   EXPECT_NE(xml.find("<skipped message=\"VIOLATED"), std::string::npos) << xml;
   EXPECT_NE(xml.find(R"(jq .config 'it'\''s.json' | nullmark run - -o - --filter '^open$')"), std::string::npos) << xml;
   const std::string markdown = summary_markdown(run, summary, "r.json");
-  for (const char* row : {"| FAIL | a<b & \"c\" | mean 0, expected 0: +0; biased, proven (log E 100.0", "| FAIL | costly | lookups differ",
-                          "| INCONCLUSIVE | open | undecided", "| VIOLATED | violating |", "--filter '^costly$'"})
+  for (const char* row :
+       {"| FAIL | a<b & \"c\" | mean 0, expected 0: +0; biased, proven (log E 100.0", "| FAIL | costly | lookups differ",
+        "| INCONCLUSIVE | open | undecided", "| VIOLATED | violating |", "--filter '^costly$'"})
     EXPECT_NE(markdown.find(row), std::string::npos) << row << "\n" << markdown;
   EXPECT_EQ(markdown.find("good"), std::string::npos);
   EXPECT_NE(summary_text(run, summary).find("1 PASS, 2 FAIL, 0 INCONCLUSIVE as planned, 1 INCONCLUSIVE, 1 VIOLATED"),
@@ -566,7 +568,9 @@ TEST_F(Check, OnlyOpenVerdictsAreNoSuccess) {
           R"("rays":"single","samples_per_ray":100,"matrix":{"estimator":["delta"],"medium":["linear"]},"gate":{"epsilon":0.001})"));
   ASSERT_EQ(run("run o.json -o r.json"), 0) << read("err");
   EXPECT_EQ(run("check r.json --junit j.xml"), 77) << read("out");
-  EXPECT_NE(read("j.xml").find("<skipped message=\"INCONCLUSIVE (as planned, by laws): not decidable at 400 samples a ray; a PASS at epsilon 0.001 needs"), std::string::npos)
+  EXPECT_NE(read("j.xml").find("<skipped message=\"INCONCLUSIVE (as planned, by laws): not decidable at 400 samples a ray; a "
+                               "PASS at epsilon 0.001 needs"),
+            std::string::npos)
       << read("j.xml");
   EXPECT_NE(read("out").find("INCONCLUSIVE (as planned, by laws)"), std::string::npos) << read("out");
 }

@@ -108,7 +108,8 @@ std::string Workshop::why_not(const Cell& cell, const Scene& scene, const Kernel
   const Real farthest = single ? kFarthestSingle : kFarthestDouble;
   if (box.lo.cwiseAbs().cwiseMax(box.hi.cwiseAbs()).maxCoeff() > farthest * box.extent().minCoeff())
     return fmt::format(
-        "the medium lies over {:g} times its size from the origin of its frame, where {} has no digits for a position; expected it "
+        "the medium lies over {:g} times its size from the origin of its frame, where {} has no digits for a position; expected "
+        "it "
         "nearer{}",
         farthest, single ? "float" : "double", single ? ", or \"double\"" : "");
   if (const Real depth = single ? deepest_majorant(scene) : 0; depth > kDeepestSingle)
