@@ -11,6 +11,8 @@ namespace {
 
 /// One sample in so many is kept, and so many of a cell.
 constexpr std::uint64_t kOneIn = 128, kFewest = 32, kMost = 4096;
+/// Where samples are long, fewer are drawn again: about so many lookups of a cell, and its first and last sample always.
+constexpr Real kLookups = 1 << 16;
 /// What a tracker learns it learns at first.
 constexpr std::uint64_t kOpening = 16;
 
@@ -63,7 +65,9 @@ LawRecord replay_law(const Cell& cell, const Scene& scene, const Kernel& kernel,
   Counters counters;
   for (const KeptSamples& samples : kept) {
     std::size_t begun = scene.rays->world.size();  // the ray at hand; none yet
+    std::size_t step = 1;
     for (std::size_t i = samples.count(); i-- > 0;) {
+      if (i % step != 0) continue;
       const KeptSamples::Sample sample = samples.at(i);
       if (sample.ray != begun) {
         if (stop()) return {"replay", 0, 0, Outcome::none};
@@ -77,6 +81,8 @@ LawRecord replay_law(const Cell& cell, const Scene& scene, const Kernel& kernel,
       const Real* again = &block.values[before * sample.values.size()];
       if (!std::equal(sample.values.begin(), sample.values.end(), again, same)) law.log_e = kCertain;
       ++law.samples;
+      const Real each = static_cast<Real>(counters.lookups) / static_cast<Real>(counters.samples);
+      step = static_cast<std::size_t>(std::max<Real>(1, std::ceil(each * static_cast<Real>(samples.count()) / kLookups)));
     }
   }
   if (stop()) return {"replay", 0, 0, Outcome::none};

@@ -47,7 +47,7 @@ class KeptSamples {
 
 /// The law "replay": a sample is a function of its address (seed, medium, ray, sample) and of nothing else.  Kept samples are
 /// drawn again by the same kernel in a new workspace, rays and samples from the last to the first, every other one alone and the
-/// rest as the second of two, and compared bit for bit.  A tracker that keeps anything from one sample for the next breaks it.
+/// rest as the second of two, and compared bit for bit; not all of them where samples take many lookups.  A tracker that keeps anything from one sample for the next breaks it.
 ///
 /// Its evidence is 0, or certain where any number differs.  `samples` of the record are the comparisons; 0 where `stop` answered
 /// true.

@@ -190,10 +190,12 @@ std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gat
   return laws;
 }
 
-/// Whether the samples' own spread says that their mean is off, by more than one sample of 1 that they have not shown could make
-/// up for, though nothing could be bet on it; how, in words.
+/// Whether the samples' own spread says that their mean is off, by more than ten samples of 1 that they have not shown could make
+/// up for, though nothing could be bet on it; how, in words.  A few samples say nothing.
 std::optional<std::string> far_off(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled) {
-  constexpr Real kStandardErrors = 6;
+  constexpr Real kStandardErrors = 6, kUnseen = 10;
+  constexpr std::uint64_t kFew = 256;
+  if (sampled.counters.samples < kFew) return std::nullopt;
   const std::size_t outputs = prepared.targets.outputs;
   for (std::size_t o = 0; o < outputs; ++o) {
     Real error = 0, squared = 0, expected = 0, rounding = 0;  // of the mean over all rays
@@ -208,8 +210,8 @@ std::optional<std::string> far_off(const PreparedCell& prepared, const CellGate&
       if (test.channel == static_cast<int>(o) && test.group == MeanTest::kAllRays)
         rounding = test.rounding + test.reference_error;
     if (std::abs(error) <= kStandardErrors * std::sqrt(squared) + rounding) continue;
-    if (std::abs(error) * static_cast<Real>(sampled.counters.samples) <= std::max({Real{1}, sampled.largest, std::abs(expected)}))
-      continue;
+    const Real unseen = kUnseen * std::max({Real{1}, sampled.largest, std::abs(expected)});
+    if (std::abs(error) * static_cast<Real>(sampled.counters.samples) <= unseen) continue;
     const std::string errors = squared > 0
                                    ? fmt::format("{:.3g} standard errors of the samples", std::abs(error) / std::sqrt(squared))
                                    : "and no variance";

@@ -23,7 +23,7 @@ Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass);
 /// Else INCONCLUSIVE.  `outputs` are the names of what is tested, where it is not channels.
 void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs = {});
 
-/// Whether laws of walks were tested; "replay" is one of samples, and every judged cell has it.
+/// Whether laws of walks were tested; "replay" and "variance" are of samples, and cells have them whatever their walks.
 bool tests_walks(const VerdictRecord& verdict);
 
 }  // namespace nullmark

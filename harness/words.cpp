@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "harness/results_json.h"
+#include "harness/verdict.h"
 
 namespace nullmark {
 namespace {
@@ -79,13 +80,13 @@ std::vector<Mark> marks_of(const CellRecord& record) {
   std::vector<Mark> marks;
   if (decided && verdict.variance_basis == "pilot" && takes_variance(verdict)) marks.push_back(Mark::pilot);
   if (verdict.against == "own mean") marks.push_back(Mark::own_mean);
-  if (!decided && verdict.lawful == Outcome::pass) marks.push_back(Mark::laws);
+  if (!decided && verdict.lawful == Outcome::pass && tests_walks(verdict)) marks.push_back(Mark::laws);
   if (verdict.bound_unproven) marks.push_back(Mark::bound);
   if (record.reliance && *record.reliance > kNoReliance)
     marks.push_back(Mark::part_of_depth);
   else if (record.given_depth && !record.reliance)
     marks.push_back(Mark::depth);
-  if (!verdict.untested.empty()) marks.push_back(Mark::law);
+  if (decided && !verdict.untested.empty()) marks.push_back(Mark::law);
   return marks;
 }
 
