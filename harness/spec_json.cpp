@@ -92,8 +92,8 @@ const std::vector<std::string>& sample_policies() {
 Json gate_json(const GateSpec& gate) {
   Json json = {{"enabled", gate.enabled}, {"max_samples_per_ray", gate.max_samples_per_ray}};
   json["laws"] = law_policies()[static_cast<std::size_t>(gate.laws)];
-  json["tolerate"] = tolerances()[static_cast<std::size_t>(gate.tolerate)];
-  json["samples"] = sample_policies()[gate.all_samples ? 1 : 0];
+  if (gate.tolerate != Tolerate::nothing) json["tolerate"] = tolerances()[static_cast<std::size_t>(gate.tolerate)];
+  if (gate.all_samples) json["samples"] = sample_policies()[1];
   if (gate.epsilon) json["epsilon"] = *gate.epsilon;
   if (gate.max_lookups_per_ray) json["max_lookups_per_ray"] = *gate.max_lookups_per_ray;
   return json;

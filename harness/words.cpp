@@ -86,7 +86,7 @@ std::vector<Mark> marks_of(const CellRecord& record) {
     marks.push_back(Mark::part_of_depth);
   else if (record.given_depth && !record.reliance)
     marks.push_back(Mark::depth);
-  if (decided && !verdict.untested.empty()) marks.push_back(Mark::law);
+  if (mean == Outcome::pass && !verdict.untested.empty()) marks.push_back(Mark::law);
   return marks;
 }
 

@@ -66,10 +66,11 @@ TEST(Words, MarksShareOnePairOfParentheses) {
   record.verdict->bound_unproven = true;
   record.verdict->untested = {"variance: no bound"};
   decide(*record.verdict);
-  EXPECT_EQ(marked_word(record), "INCONCLUSIVE (as planned, by laws, bound not proven, law not tested)");
+  EXPECT_EQ(marked_word(record), "INCONCLUSIVE (as planned, by laws, bound not proven)");
   record = passed_by_own_mean();
   record.verdict->bound_unproven = true;
-  EXPECT_EQ(marked_word(record), "PASS (own mean, bound not proven)");
+  record.verdict->untested = {"variance: no bound"};
+  EXPECT_EQ(marked_word(record), "PASS (own mean, bound not proven, law not tested)");
 }
 
 TEST(Words, TheExactDepthIsAMarkOfThoseThatLeanOnIt) {
