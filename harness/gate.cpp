@@ -385,8 +385,6 @@ class GatePlanner {
       gate_.variances.push_back(std::move(test));
     }
     if (!gate_.variances.empty()) gate_.stated_variance = theory_.ray_variance;
-    if (!gate_.variances.empty() && !std::isfinite(gate_.high))
-      gate_.untested.emplace_back("a stated variance that is too large: samples have no upper bound");
   }
 
   const Cell& cell_;

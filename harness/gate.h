@@ -53,7 +53,6 @@ struct CellGate {
   /// Of outputs whose stated variance is tested: errors are squared distances to the expected mean less that variance.
   std::vector<MeanTest> variances;
   std::vector<Real> stated_variance;  ///< [ray * outputs + o]; empty where none is tested
-  std::vector<std::string> untested;  ///< what verdicts rest on and no test covers
   std::vector<int> group_of;          ///< per ray
   std::vector<Real>
       shift;  ///< [ray * outputs + o], the claimed mean minus the reference, for estimators judged by their own mean

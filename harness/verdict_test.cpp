@@ -510,7 +510,7 @@ class Check : public ProgramTest {
 TEST_F(Check, PassesWhatPassed) {
   ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");
   EXPECT_EQ(run("check r.json --junit j.xml --markdown m.md"), 0) << read("out");
-  EXPECT_NE(read("out").find("8 PASS (2 law not tested), 0 FAIL"), std::string::npos) << read("out");
+  EXPECT_NE(read("out").find("8 PASS, 0 FAIL"), std::string::npos) << read("out");
   EXPECT_NE(read("j.xml").find(R"(tests="8" failures="0" errors="0" skipped="0")"), std::string::npos);
   EXPECT_EQ(run("check nowhere.json"), 2);
 }
