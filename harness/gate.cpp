@@ -296,8 +296,8 @@ class GatePlanner {
     needs_ = fmt::format("not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} (relative variance {:.2g})",
                          gate_.affordable, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
     tight_ = fmt::format(
-        "perhaps not decidable at {} samples a ray; a PASS at epsilon {:.2g} takes {:.2g} on average and {:.2g} to "
-        "be sure of it",
+        "perhaps not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} with a chance of .95, and {:.2g} to be "
+        "sure",
         gate_.allowance, test.epsilon / mean, static_cast<double>(test.planned), static_cast<double>(test.sure));
   }
 
