@@ -10,7 +10,6 @@ Real product_variance(Real log_mean, Real spread) { return std::exp(2 * log_mean
 
 namespace {
 
-constexpr int kNodes = RayProfile::kNodes;
 constexpr Real kPanelDepth = 2;
 constexpr std::size_t kMaxPanels = 16384;
 

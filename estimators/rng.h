@@ -17,6 +17,15 @@ struct SampleAddress {
   std::uint64_t sample = 0;
 };
 
+/// Where each use of a cell's streams begins, so that no two share one.  Results and verdicts draw samples from 0.
+namespace first_sample {
+inline constexpr std::uint64_t kLaws = std::uint64_t{1} << 61;
+inline constexpr std::uint64_t kReliance = std::uint64_t{5} << 59;
+inline constexpr std::uint64_t kFreePaths = std::uint64_t{3} << 60;
+inline constexpr std::uint64_t kPilot = std::uint64_t{1} << 62;
+inline constexpr std::uint64_t kCountedLookups = std::uint64_t{5} << 60;
+}  // namespace first_sample
+
 /// xoroshiro128++ [Blackman and Vigna 2021], its state one Philox4x32-10 block of the address.  Counts its draws.
 class Rng {
  public:

@@ -143,6 +143,7 @@ class CommandLine {
         ->check(CLI::Range(0, 4096));
     command->add_option("--seed", run_.seed, "Seed in place of the configuration's, or \"random\"");
     command->add_option("--filter", run_.filter, "Only cells whose name matches this regular expression");
+    command->add_flag("--covering", run_.covering, "Only a part that meets every pair of estimator, medium, depth and majorant");
     command->add_option("--shard", run_.shard, "Only part K of N: K/N");
     command->add_flag("--resume", run_.resume, "Go on from the results and the journal that are there");
     command->add_flag("--force", run_.force, "Replace results that are there")->excludes("--resume");

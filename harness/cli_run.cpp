@@ -16,6 +16,7 @@
 
 #include "harness/commands.h"
 #include "harness/config.h"
+#include "harness/covering.h"
 #include "harness/file_io.h"
 #include "harness/journal.h"
 #include "harness/outputs.h"
@@ -78,7 +79,7 @@ Shard requested_shard(const std::string& text) {
   throw InputError(fmt::format("--shard: found \"{}\"; expected K/N with 1 <= K <= N, as in 2/4", text));
 }
 
-/// The cells of a plan that `--filter` picks.
+/// The cells of a plan that `--filter` and `--covering` pick.
 std::vector<bool> filtered(const Plan& plan, const RunCommand& command) {
   std::regex pattern;
   try {
@@ -86,9 +87,9 @@ std::vector<bool> filtered(const Plan& plan, const RunCommand& command) {
   } catch (const std::regex_error& error) {
     throw InputError(fmt::format("--filter: found \"{}\"; expected a regular expression: {}", command.filter, error.what()));
   }
-  std::vector<bool> wanted(plan.cells.size());
+  std::vector<bool> wanted = command.covering ? covering_cells(plan) : std::vector<bool>(plan.cells.size(), true);
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
-    wanted[i] = command.filter.empty() || std::regex_search(plan.cells[i].name, pattern);
+    wanted[i] = wanted[i] && (command.filter.empty() || std::regex_search(plan.cells[i].name, pattern));
   return wanted;
 }
 
@@ -242,6 +243,7 @@ RunContext context_of(const RunCommand& command, const Plan& plan) {
   RunContext context;
   context.command_line = command.command_line;
   context.filter = command.filter;
+  context.covering = command.covering;
   context.shard = command.shard;
   context.threads = command.threads > 0 ? command.threads : static_cast<int>(std::thread::hardware_concurrency());
   std::set<std::uint64_t> seeds;
@@ -274,7 +276,7 @@ ExitCode run_command(const RunCommand& command) {
   const std::vector<bool> wanted = filtered(plan, command), selected = of_shard(wanted, command);
   const auto count = static_cast<std::size_t>(std::count(selected.begin(), selected.end(), true));
   if (count == 0) {
-    fmt::print(stderr, "nullmark: nothing selected: none of {} cells passes --filter and --shard\n", plan.cells.size());
+    fmt::print(stderr, "nullmark: nothing selected: none of {} cells passes --filter, --covering and --shard\n", plan.cells.size());
     return ExitCode::nothing_ran;
   }
   if (seed) warn_of_own_seeds(plan, *seed);

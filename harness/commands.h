@@ -11,10 +11,11 @@ namespace nullmark {
 /// `nullmark run`.
 struct RunCommand {
   std::vector<std::string> configs;
-  std::string output;  ///< empty: by the configuration's name; "-": standard output
-  std::string seed;    ///< empty: the configuration's; "random"; or a number
-  std::string filter;  ///< regular expression on cell names
-  std::string shard;   ///< "K/N", 1 <= K <= N
+  std::string output;     ///< empty: by the configuration's name; "-": standard output
+  std::string seed;       ///< empty: the configuration's; "random"; or a number
+  std::string filter;     ///< regular expression on cell names
+  bool covering = false;  ///< only cells that are covering_cells
+  std::string shard;      ///< "K/N", 1 <= K <= N
   int threads = 0;
   std::optional<double> time_budget;
   bool resume = false, force = false, dry_run = false, no_timing = false;

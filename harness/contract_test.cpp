@@ -85,6 +85,19 @@ int agreeing(const std::vector<CellRecord>& records) {
   return ran;
 }
 
+/// For every edit: smooth, with jumps, and known only by lookups.
+TEST(Contract, EveryHonestEstimatorMeetsThemOnThreeMedia) {
+  const auto records = run(fmt::format(
+      R"("rays":{},"samples_per_ray":300000,
+          "matrix":{{"estimator":[{}],
+                    "medium":[{{"type":"linear","begin":1,"end":0,"optical_depth":2,"lo":[-0.2,0,0],"hi":[1.4,1,1]}},
+                              {{"type":"layers","values":[[0.2,3,0,1]],"lo":[0.1,0,0],"hi":[1.2,1,1]}},
+                              {{"type":"fractal_noise","peak":6,"octaves":3,"lo":[-0.2,0,0],"hi":[1.1,1,1]}}],
+                    "majorant":[{{"type":"grid","resolution":5}}]}})",
+      kThroughAll, honest_estimators()));
+  EXPECT_GT(agreeing(records), 18);
+}
+
 TEST(Contract, EveryHonestEstimatorMeetsMeanVarianceAndLookupsOnEveryMedium) {
   const auto records = run(fmt::format(
       R"("rays":{},"samples_per_ray":300000,

@@ -6,9 +6,6 @@
 namespace nullmark {
 namespace {
 
-/// Streams of their own.
-constexpr std::uint64_t kFirstSample = std::uint64_t{5} << 60;
-
 /// Lookups may be off by this part, and theory's by a quadrature's error.
 constexpr Real kOther = 0.01, kTheoryError = 1e-6;
 
@@ -39,7 +36,8 @@ std::uint64_t counted_walks(const Cell& cell, const Scene& scene, const Kernel& 
     kernel.begin_ray(*workspace, *scene.medium->medium, scene.medium->extrema, context);
     recording.restart();
     workspace->recording = &recording;
-    kernel.sample(*workspace, *scene.medium->medium, context, key, kFirstSample, per_ray, cell.quantity, block, counters);
+    kernel.sample(*workspace, *scene.medium->medium, context, key, first_sample::kCountedLookups, per_ray, cell.quantity, block,
+                  counters);
     workspace->recording = nullptr;
     const Real expected = theory.ray_lookups[ray];
     if (counters.overruns > 0 || !std::all_of(recording.walks.begin(), recording.walks.end(),

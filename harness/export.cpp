@@ -14,7 +14,7 @@ namespace {
 
 Json provenance_value(const RunRecord& run, const std::string& key) {
   const auto at = run.provenance.find(key);
-  return at == run.provenance.end() ? Json(nullptr) : Json::parse(at->second);
+  return at == run.provenance.end() ? Json(nullptr) : known_json(at->second);
 }
 
 /// Estimator first, so that one can be filtered against another.

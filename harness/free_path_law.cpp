@@ -8,9 +8,6 @@
 namespace nullmark {
 namespace {
 
-/// Streams of their own.
-constexpr std::uint64_t kFirstSample = std::uint64_t{3} << 60;
-
 constexpr std::size_t kMostRays = 16;
 constexpr Real kFewestExpected = 20;
 
@@ -92,8 +89,8 @@ std::vector<LawRecord> free_path_laws(const Cell& cell, const Scene& scene, cons
       if (stop()) return {};
       recording.restart();
       workspace->recording = &recording;
-      kernel.sample(*workspace, *scene.medium->medium, context, key, kFirstSample + done, std::min(kBatch, samples - done),
-                    cell.quantity, block, counters);
+      kernel.sample(*workspace, *scene.medium->medium, context, key, first_sample::kFreePaths + done,
+                    std::min(kBatch, samples - done), cell.quantity, block, counters);
       workspace->recording = nullptr;
       for (const Recording::Walk& walk : recording.walks) {
         if (!is_collision(walk.end)) {

@@ -10,6 +10,8 @@
 #include <numeric>
 #include <set>
 
+template class nlohmann::basic_json<nlohmann::ordered_map>;
+
 namespace nullmark {
 namespace {
 
@@ -133,6 +135,8 @@ Json parse_json(const std::string& text, const std::string& file) {
     throw InputError(position(file, text, std::max<std::size_t>(offset(), 1) - 1) + ": " + bare_message(error.what()));
   }
 }
+
+Json known_json(const std::string& text) { return Json::parse(text, nullptr, false); }
 
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates) {
   std::string best;

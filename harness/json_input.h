@@ -9,6 +9,9 @@
 
 #include "media/types.h"
 
+// json_input.cpp holds the members of this class, or every file that uses JSON would compile its parser and its printer anew.
+extern template class nlohmann::basic_json<nlohmann::ordered_map>;
+
 namespace nullmark {
 
 /// Keeps the order of keys.
@@ -21,6 +24,9 @@ struct InputError : std::runtime_error {
 
 /// Strict JSON.  Throws InputError "file:line:column: ..." for syntax errors and for keys that occur twice.
 Json parse_json(const std::string& text, const std::string& file);
+
+/// JSON that the program wrote itself; `is_discarded()` where it is none.
+Json known_json(const std::string& text);
 
 /// The candidate fewest edits away from a misspelt word; empty where none is near.
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates);

@@ -8,9 +8,6 @@
 namespace nullmark {
 namespace {
 
-/// Streams of the laws, far from those of means, verdicts and pilots.
-constexpr std::uint64_t kFirstSample = std::uint64_t{1} << 61;
-
 /// Rays that take part: all, or so many evenly spaced ones.
 constexpr std::size_t kMostRays = 16;
 
@@ -78,8 +75,8 @@ class LawTester {
         if (stop()) return false;
         recording.restart();
         workspace->recording = &recording;
-        kernel_.sample(*workspace, *scene_.medium->medium, context_, key, kFirstSample + done, std::min(batch, samples - done),
-                       cell_.quantity, block, counters);
+        kernel_.sample(*workspace, *scene_.medium->medium, context_, key, first_sample::kLaws + done,
+                       std::min(batch, samples - done), cell_.quantity, block, counters);
         workspace->recording = nullptr;
         for (std::size_t i = 0; i < recording.walks.size(); ++i) {
           take(recording.walks[i], &block.values[i * outputs_]);
@@ -286,8 +283,8 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
   own.gate = {};
   const CellGate gate = plan_gate(own, pieces, targets, range, Claim::unbiased, all[0], std::nullopt, {});
   const auto sampled =
-      sample_cell(own, pieces, kernel, targets, {.first = kFirstSample, .per_ray = samples, .only_evidence = true}, &gate, stop,
-                  [](double) {});
+      sample_cell(own, pieces, kernel, targets, {.first = first_sample::kLaws, .per_ray = samples, .only_evidence = true}, &gate,
+                  stop, [](double) {});
   if (!sampled) return std::nullopt;
   std::vector<Real> logs;
   for (std::size_t i = 0; i < gate.tests.size(); ++i) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 
 #include "harness/config.h"
@@ -29,12 +30,12 @@ const CellRecord* better(const CellRecord* a, const CellRecord* b) {
 }
 
 /// What a run was asked for, shards aside; JSON texts, empty where it does not say.
-std::pair<std::string, std::string> selection(const RunRecord& run) {
+std::array<std::string, 3> selection(const RunRecord& run) {
   const auto text = [&](const char* key) {
     const auto at = run.provenance.find(key);
     return at == run.provenance.end() ? std::string() : at->second;
   };
-  return {text("filter"), text("selected")};
+  return {text("filter"), text("covering"), text("selected")};
 }
 
 }  // namespace
@@ -70,7 +71,7 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
   Json list = Json::array();
   for (const RunRecord& part : parts) {
     list.push_back(Json::object());
-    for (const auto& [key, text] : part.provenance) list.back()[key] = Json::parse(text);
+    for (const auto& [key, text] : part.provenance) list.back()[key] = known_json(text);
   }
   merged.provenance["parts"] = list.dump();
   // Parts of one selection make it whole; those of several are measured by the whole configuration.
@@ -79,6 +80,7 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
       std::all_of(parts.begin(), parts.end(), [&](const RunRecord& part) { return selection(part) == selection(parts[0]); });
   if (!same) {
     merged.provenance.erase("filter");
+    merged.provenance.erase("covering");
     merged.provenance.erase("selected");
   }
   for (const Cell& cell : read_config(parts[0].config_text, names[0] + "#config").cells)

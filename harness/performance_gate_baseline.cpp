@@ -42,7 +42,7 @@ std::string setting_of(const CellRecord& record) {
 BuildKey build_of(const RunRecord& run) {
   const auto json = [&](const char* key) {
     const auto at = run.provenance.find(key);
-    return at == run.provenance.end() ? Json() : Json::parse(at->second);
+    return at == run.provenance.end() ? Json() : known_json(at->second);
   };
   const auto text = [](const Json& object, const char* key) {
     return object.is_object() && object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : std::string();

@@ -105,6 +105,7 @@ std::map<std::string, std::string> make_provenance(const RunContext& context, st
       {"start", text(iso_time(context.start))},
       {"seconds", text(seconds)}};
   if (!context.filter.empty()) provenance["filter"] = text(context.filter);
+  if (context.covering) provenance["covering"] = text(true);
   if (!context.shard.empty()) provenance["shard"] = text(context.shard);
   return provenance;
 }

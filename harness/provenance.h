@@ -14,7 +14,9 @@ struct RunContext {
   std::vector<std::string> command_line;
   int threads = 0;            ///< cores used
   std::string filter, shard;  ///< as given; empty: all cells
-  std::size_t selected = 0;   ///< cells that the filter picks, of all shards, and those that were there before
+  bool covering = false;      ///< see covering.h
+  std::size_t selected =
+      0;  ///< cells that the filter and the covering part pick, of all shards, and those that were there before
   /// Time of the verdicts' evidence, and of all statistics, over that of the sampling.
   std::optional<double> verdict_share, statistics_share;
   std::vector<std::uint64_t> seeds;

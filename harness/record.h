@@ -77,6 +77,8 @@ struct TestRecord {
   std::uint64_t planned = 0;             ///< samples per ray
   std::vector<Real> rates;               ///< of the bets against "mean error 0"
   Outcome outcome = Outcome::none;
+
+  bool deterministic() const { return basis == "deterministic"; }
 };
 
 /// A law that walks must follow, as `check` derives its outcome.

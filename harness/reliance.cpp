@@ -6,9 +6,6 @@
 namespace nullmark {
 namespace {
 
-/// Streams of their own.
-constexpr std::uint64_t kFirstSample = std::uint64_t{5} << 59;
-
 constexpr std::size_t kMostRays = 64;
 constexpr Real kScale = 1.01, kMostError = 0.005, kLargest = 10;
 constexpr std::uint64_t kFirstRound = 256, kBatch = 4096;
@@ -44,8 +41,8 @@ struct Pair {
 
   void draw(std::uint64_t first, std::uint64_t count) {
     const Medium& medium = *scene.medium->medium;
-    kernel.sample(*told, medium, context, key, kFirstSample + first, count, cell.quantity, values, counters);
-    kernel.sample(*told_wrong, medium, wrong, key, kFirstSample + first, count, cell.quantity, wrong_values, counters);
+    kernel.sample(*told, medium, context, key, first_sample::kReliance + first, count, cell.quantity, values, counters);
+    kernel.sample(*told_wrong, medium, wrong, key, first_sample::kReliance + first, count, cell.quantity, wrong_values, counters);
   }
 
   /// X' - X of a sample of the block, summed over channels, without what the target moved.

@@ -13,7 +13,7 @@ namespace {
 std::string short_version(const std::map<std::string, std::string>& provenance) {
   const auto json = [&](const char* key) {
     const auto at = provenance.find(key);
-    return at == provenance.end() ? Json() : Json::parse(at->second);
+    return at == provenance.end() ? Json() : known_json(at->second);
   };
   const Json version = json("version"), git = json("git");
   if (!version.is_string()) return "an unknown version";

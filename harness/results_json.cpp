@@ -391,7 +391,7 @@ CellRecord read_cell(const Place& place) {
 
 std::string results_text(const RunRecord& run) {
   Json provenance = Json::object();
-  for (const auto& [key, text] : run.provenance) provenance[key] = Json::parse(text);
+  for (const auto& [key, text] : run.provenance) provenance[key] = known_json(text);
   std::string text =
       fmt::format("{{\n\"nullmark_schema\": {},\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": {},\n", RunRecord::kSchema,
                   Json(run.name).dump(), config_hash(run.config_text), run.config_text.empty() ? "null" : run.config_text);

@@ -91,11 +91,9 @@ Real lookups_of_a_sample(const Sampled& sampled) {
 
 /// Variances from samples of their own, where theory has none; some of them are kept.
 std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSamples>& kept, const std::function<bool()>& stop) {
-  // Far beyond the samples of any verdict, so that the streams are others.
-  constexpr std::uint64_t kFirst = std::uint64_t{1} << 62;
   const auto sampled =
       sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                  {.first = kFirst, .per_ray = prepared.samples_per_ray, .keep = true}, nullptr, stop, [](double) {});
+                  {.first = first_sample::kPilot, .per_ray = prepared.samples_per_ray, .keep = true}, nullptr, stop, [](double) {});
   if (!sampled || prepared.samples_per_ray < 2) return std::nullopt;
   if (sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   Pilot pilot;
@@ -306,7 +304,7 @@ class Judging {
   bool promising() const {
     const Real needed = std::log(static_cast<Real>(verdict_.family) / verdict_.alpha);
     return std::any_of(verdict_.tests.begin(), verdict_.tests.end(), [&](const TestRecord& test) {
-      return test.channel >= 0 && test.basis != "deterministic" && test.log_e_fail >= needed / 2;
+      return test.channel >= 0 && !test.deterministic() && test.log_e_fail >= needed / 2;
     });
   }
 

@@ -47,7 +47,7 @@ std::string order_line(const OrderFit& fit) {
 
 /// The configuration in the results names every cell, whatever a filter, a shard or a time budget left of them.
 std::size_t configured_cells(const RunRecord& run, const std::function<bool(const Json&)>& counts) {
-  const Json config = Json::parse(run.config_text, nullptr, false);
+  const Json config = known_json(run.config_text);
   std::size_t cells = 0;
   if (!config.is_object() || !config.contains("experiments")) return cells;
   for (const Json& experiment : config["experiments"])
@@ -60,7 +60,7 @@ std::size_t configured_cells(const RunRecord& run, const std::function<bool(cons
 std::optional<std::size_t> selected_cells(const RunRecord& run) {
   const auto at = run.provenance.find("selected");
   if (at == run.provenance.end()) return std::nullopt;
-  const Json selected = Json::parse(at->second, nullptr, false);
+  const Json selected = known_json(at->second);
   return selected.is_number_unsigned() ? std::optional(selected.get<std::size_t>()) : std::nullopt;
 }
 
@@ -124,7 +124,8 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
   std::vector<std::string> lines;
   if (summary.selected < summary.configured) {
     const auto filter = run.provenance.find("filter");
-    lines.push_back(fmt::format("{} of the configuration's {} cells were selected{}", summary.selected, summary.configured,
+    lines.push_back(fmt::format("{} of the configuration's {} cells were selected{}{}", summary.selected, summary.configured,
+                                run.provenance.contains("covering") ? " by --covering" : "",
                                 filter == run.provenance.end() ? "" : fmt::format(" by --filter {}", filter->second)));
   }
   if (summary.never_started > 0)

@@ -37,6 +37,15 @@ struct Repetition {
   Real waiting = 0;  ///< see waiting_share
 };
 
+/// Google Benchmark 1.8 renamed `error_occurred` to `skipped`.
+template <class Run>
+bool was_skipped(const Run& run) {
+  if constexpr (requires { run.error_occurred; })
+    return run.error_occurred;
+  else
+    return static_cast<bool>(run.skipped);
+}
+
 class Collector final : public benchmark::BenchmarkReporter {
  public:
   Collector(const std::function<void(double)>& progress, std::size_t expected) : progress_(progress), expected_(expected) {}
@@ -45,7 +54,7 @@ class Collector final : public benchmark::BenchmarkReporter {
 
   void ReportRuns(const std::vector<Run>& runs) override {
     for (const Run& run : runs) {
-      if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
+      if (run.run_type != Run::RT_Iteration || was_skipped(run)) continue;
       const auto iterations = static_cast<Real>(run.iterations);
       all[run.run_name.function_name].push_back({run.real_accumulated_time / iterations * 1e9,
                                                  run.counters.at("samples") / iterations, run.counters.at("lookups") / iterations,

@@ -11,8 +11,6 @@ namespace {
 /// The reference's own error may take so much of epsilon where a PASS is to be had.
 constexpr Real kReferenceShare = 0.25;
 
-bool deterministic(const TestRecord& test) { return test.basis == "deterministic"; }
-
 std::string place_of(const TestRecord& test, const std::vector<std::string>& outputs, std::size_t tests) {
   if (test.channel < 0) return "lookups: ";
   if (tests == 1 && test.group < 0) return "";
@@ -37,7 +35,7 @@ std::string measured_bias(const TestRecord& test) {
 }
 
 std::string failure(const TestRecord& test, const Proof& proof, Real alpha) {
-  if (deterministic(test))
+  if (test.deterministic())
     return fmt::format("a sample is off by {:.3g}, rounding allows {:.3g}; {}", test.largest_error,
                        test.rounding + test.reference_error, measured_bias(test));
   const Real needed = -std::log(alpha);
@@ -57,7 +55,7 @@ std::string within_text(const std::vector<const TestRecord*>& tests, const char*
   for (const TestRecord* test : tests)
     if (test->group < 0 && (!widest || relative(*test) > relative(*widest))) widest = test;
   if (!widest) return "";
-  const Real of = deterministic(*widest) ? widest->rounding + widest->reference_error : widest->epsilon;
+  const Real of = widest->deterministic() ? widest->rounding + widest->reference_error : widest->epsilon;
   if (widest->reference == 0) return fmt::format("{} < {:.2g}", error, of);
   return fmt::format("{} < {:.2g} % of the mean", error, 100 * of / std::abs(widest->reference));
 }
@@ -65,7 +63,7 @@ std::string within_text(const std::vector<const TestRecord*>& tests, const char*
 }  // namespace
 
 Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
-  if (deterministic(test)) {
+  if (test.deterministic()) {
     const bool right = test.largest_error <= test.rounding + test.reference_error;
     const bool far = !right && std::abs(test.mean_error) > test.epsilon + test.rounding + test.reference_error;
     return {.biased = !right, .beyond = far, .within = right && test.reference_error <= kReferenceShare * test.epsilon};

@@ -34,14 +34,12 @@ Real read_real(const Place& object, const char* key, Real instead) {
   return object.has(key) && !object[key].json().is_null() ? object[key].number() : instead;
 }
 
-bool deterministic(const TestRecord& test) { return test.basis == "deterministic"; }
-
 Json test_json(const TestRecord& test) {
   Json json = {{"channel", test.channel},           {"samples", test.samples},
                {"epsilon", real(test.epsilon)},     {"reference_error", real(test.reference_error)},
                {"variance", real(test.variance)},   {"basis", test.basis},
                {"reference", real(test.reference)}, {"mean_error", real(test.mean_error)}};
-  if (deterministic(test)) {
+  if (test.deterministic()) {
     json["largest_error"] = real(test.largest_error);
     json["rounding"] = real(test.rounding);
   } else {
@@ -71,7 +69,7 @@ Json groups_json(const std::vector<const TestRecord*>& groups) {
   list("log_e_beyond", &TestRecord::log_e_beyond);
   list("reference", &TestRecord::reference);
   list("mean_error", &TestRecord::mean_error);
-  if (std::any_of(groups.begin(), groups.end(), [](const TestRecord* test) { return deterministic(*test); })) {
+  if (std::any_of(groups.begin(), groups.end(), [](const TestRecord* test) { return test->deterministic(); })) {
     list("largest_error", &TestRecord::largest_error);
     list("rounding", &TestRecord::rounding);
   }
@@ -91,7 +89,7 @@ TestRecord read_test(const Place& place) {
   test.mean_error = read_real(place, "mean_error", 0);
   test.largest_error = read_real(place, "largest_error", kInfinity);
   test.rounding = read_real(place, "rounding", 0);
-  if (test.basis != "deterministic") {
+  if (!test.deterministic()) {
     const Place log_e = place["log_e"];
     log_e.expect_object();
     test.log_e_fail = read_real(log_e, "fail", -kInfinity);

@@ -42,7 +42,7 @@ Json per_output(const CellRecord& record, std::optional<Real> ChannelRecord::*me
   return list;
 }
 
-Json time_json(const CellRecord& record) {
+Json time_row(const CellRecord& record) {
   if (!record.time) return nullptr;
   return {{"ns_per_sample", interval(median_interval(record.time->repetition_ns))},
           {"ns_per_lookup", number(record.time->ns_per_lookup)},
@@ -94,7 +94,7 @@ std::optional<Interval> sample_time(const Cost& cost, std::uint64_t samples) {
 
 /// Error and variance of means of 1, 2, 4, ... samples as measured, relative to the reference's root mean square; a mean square
 /// over G groups has the relative error sqrt((kurtosis - 1) / G).
-Json convergence_json(const CellRecord& record, const std::optional<Cost>& cost) {
+Json convergence_row(const CellRecord& record, const std::optional<Cost>& cost) {
   if (!cost || record.channel.empty()) return Json::array();
   Real excess = 0;
   for (const ChannelRecord& channel : record.channel) excess = std::max(excess, channel.kurtosis.value_or(3) - 3);
@@ -179,7 +179,7 @@ Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& image
           {"violations", record.majorant_violations},
           {"largest_violation", number(record.largest_violation)},
           {"draws", number(record.draws_per_sample)},
-          {"time", time_json(record)},
+          {"time", time_row(record)},
           {"verdict", verdict_json_of(record)},
           {"cost", nullptr},
           {"convergence", Json::array()},
@@ -347,7 +347,7 @@ std::string base_name(const CellRecord& record) {
 
 /// Who made the volumes that the run shows.
 std::set<std::string> credits(const RunRecord& run) {
-  const Json config = run.config_text.empty() ? Json::object() : Json::parse(run.config_text);
+  const Json config = run.config_text.empty() ? Json::object() : known_json(run.config_text);
   std::set<std::string> lines;
   for (const CellRecord& record : run.cells) {
     const std::string file = base_name(record);
@@ -375,7 +375,7 @@ std::string command_line(const Json& provenance) {
 
 Json run_json(const RunRecord& run, const Summary& summary, const std::string& file) {
   Json provenance = Json::object();
-  for (const auto& [key, text] : run.provenance) provenance[key] = Json::parse(text);
+  for (const auto& [key, text] : run.provenance) provenance[key] = known_json(text);
   const std::string name = std::filesystem::path(file).filename().string();
   return {{"name", run.name},
           {"file", name},
@@ -432,7 +432,7 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
       Json& cell = json["cells"][places.at(contender.record)];
       cell["scene"] = scene;
       cell["cost"] = cost_json(contender);
-      cell["convergence"] = convergence_json(*contender.record, contender.cost);
+      cell["convergence"] = convergence_row(*contender.record, contender.cost);
     }
     for (const Pairing& pairing : all[scene].pairings)
       json["paired"].push_back({{"scene", scene},
