@@ -17,8 +17,6 @@ namespace {
 
 using Setter = std::function<void(Draft&)>;
 
-constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
-
 const std::vector<std::string> kAxes = {"estimator",     "medium", "majorant",    "rays",      "quantity", "samples_per_ray",
                                         "equal_lookups", "seed",   "measurement", "transport", "precision"};
 const std::vector<std::string> kSingle = {"images", "image_maximum", "own_streams", "gate", "reference"};
@@ -113,7 +111,7 @@ std::vector<Setter> read_axis(const std::string& key, const Place& place) {
   if (key == "transport")
     return setters(each(place, read_transport), [](Draft& d, const TransportSpec& t) { d.cell.transport = t; });
   if (key == "seed") {
-    const auto read = [](const Place& at) { return at.unsigned_integer(0, kAny); };
+    const auto read = [](const Place& at) { return at.unsigned_integer(0); };
     return setters(each(place, read), [](Draft& d, std::uint64_t seed) { d.cell.seed = seed; });
   }
   if (key == "samples_per_ray")
@@ -182,7 +180,7 @@ Test read_test(const std::string& key, const Place& place) {
   if (key == "transport")
     return any_matches(each(place, read_transport), [](const Draft& d, const TransportSpec& t) { return d.cell.transport == t; });
   if (key == "seed")
-    return any_matches(each(place, [](const Place& at) { return at.unsigned_integer(0, kAny); }),
+    return any_matches(each(place, [](const Place& at) { return at.unsigned_integer(0); }),
                        [](const Draft& d, std::uint64_t seed) { return d.cell.seed == seed; });
   if (key == "samples_per_ray")
     return any_matches(each(place, read_samples), [](const Draft& d, std::uint64_t samples) {

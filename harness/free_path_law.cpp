@@ -8,7 +8,7 @@
 namespace nullmark {
 namespace {
 
-constexpr std::size_t kMostRays = 16;
+constexpr std::size_t kMostLawRays = 16;
 constexpr Real kFewestExpected = 20;
 
 /// -log of the chance that chi-square is at least so large; finite however large it is.
@@ -63,7 +63,7 @@ std::string why_no_free_path_laws(const Scene& scene, SampleRange range, const C
 
 std::vector<LawRecord> free_path_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleRange range,
                                       const CellTheory& theory, const LawBudget& budget, const std::function<bool()>& stop) {
-  const std::size_t rays = scene.rays->world.size(), taken = std::min(rays, kMostRays);
+  const std::size_t rays = scene.rays->world.size(), taken = std::min(rays, kMostLawRays);
   if (taken == 0 || !why_no_free_path_laws(scene, range, theory).empty()) return {};
   const Real each = std::max<Real>(1, theory.lookups.value_or(1));
   const auto samples = static_cast<std::uint64_t>(std::clamp<Real>(budget.lookups / (each * static_cast<Real>(taken)), 100, 2e5));

@@ -136,6 +136,9 @@ Json parse_json(const std::string& text, const std::string& file) {
   }
 }
 
+Json number_or_null(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+Json number_or_null(const std::optional<Real>& x) { return x ? number_or_null(*x) : Json(nullptr); }
+
 Json known_json(const std::string& text) { return Json::parse(text, nullptr, false); }
 
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates) {

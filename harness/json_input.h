@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -24,6 +26,10 @@ struct InputError : std::runtime_error {
 
 /// Strict JSON.  Throws InputError "file:line:column: ..." for syntax errors and for keys that occur twice.
 Json parse_json(const std::string& text, const std::string& file);
+
+/// JSON has no infinities and no NaN: null instead.
+Json number_or_null(Real x);
+Json number_or_null(const std::optional<Real>& x);
 
 /// JSON that the program wrote itself; `is_discarded()` where it is none.
 Json known_json(const std::string& text);
@@ -64,7 +70,7 @@ class Place {
   /// A finite number above 0.
   Real positive() const;
   /// A whole number; 1e3 counts as one.
-  std::uint64_t unsigned_integer(std::uint64_t low, std::uint64_t high) const;
+  std::uint64_t unsigned_integer(std::uint64_t low, std::uint64_t high = std::numeric_limits<std::uint64_t>::max()) const;
   std::int64_t integer(std::int64_t low, std::int64_t high) const;
 
   /// "file: /pointer: message"

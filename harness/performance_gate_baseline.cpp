@@ -24,8 +24,6 @@ constexpr const char* kSchemaKey = "nullmark_baseline";
 /// Refreshes that a history remembers.
 constexpr std::size_t kHistory = 20;
 
-constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
-
 /// "gcc 12.2.0" to "gcc 12"
 std::string without_minor(const std::string& version) { return version.substr(0, version.find('.', version.find(' '))); }
 
@@ -67,12 +65,12 @@ void refuse_repeated_names(const Counts& counts) {
 
 CellCounts read_cell_counts(const Place& place) {
   CellCounts cell;
-  const auto whole = [&](const char* key) { return place[key].unsigned_integer(0, kAny); };
+  const auto whole = [&](const char* key) { return place[key].unsigned_integer(0); };
   const auto real = [&](const char* key) { return place.has(key) ? std::optional(place[key].number()) : std::nullopt; };
   cell.name = place["name"].string();
   cell.id = place["id"].string();
   cell.setting = place["setting"].string();
-  cell.samples = place["samples"].unsigned_integer(1, kAny);
+  cell.samples = place["samples"].unsigned_integer(1);
   cell.lookups = whole("lookups");
   cell.draws = whole("draws");
   cell.null_collisions = whole("null_collisions");
@@ -86,7 +84,7 @@ CellCounts read_cell_counts(const Place& place) {
 }
 
 Counts read_baseline(const Place& top) {
-  if (top[kSchemaKey].unsigned_integer(0, kAny) != kSchema)
+  if (top[kSchemaKey].unsigned_integer(0) != kSchema)
     top[kSchemaKey].expected(fmt::format("{}, the schema this program reads", kSchema));
   Counts counts;
   counts.source = top.file();

@@ -6,7 +6,7 @@
 namespace nullmark {
 namespace {
 
-constexpr std::size_t kMostRays = 64;
+constexpr std::size_t kMostPairs = 64;
 constexpr Real kScale = 1.01, kMostError = 0.005, kLargest = 10;
 constexpr std::uint64_t kFirstRound = 256, kBatch = 4096;
 constexpr std::uint64_t kMostSamples = std::uint64_t{1} << 24, kMostLookups = std::uint64_t{1} << 26;  // of all rays
@@ -63,7 +63,7 @@ struct Differences {
 std::optional<Real> measure_reliance(const Cell& cell, const Scene& scene, const Kernel& kernel,
                                      const std::function<bool()>& stop) {
   const bool told = cell.quantity == Quantity::transmittance || cell.quantity == Quantity::optical_depth;
-  const std::size_t rays = scene.rays->world.size(), taken = std::min(rays, kMostRays);
+  const std::size_t rays = scene.rays->world.size(), taken = std::min(rays, kMostPairs);
   if (!told || !kernel.needs_optical_depth() || taken == 0) return std::nullopt;
   Pair pair{.cell = cell, .scene = scene, .kernel = kernel};
   pair.told->stop = pair.told_wrong->stop = stop;

@@ -11,12 +11,12 @@
 namespace nullmark {
 namespace {
 
-Json number(Real x) { return std::isfinite(x) ? Json(x) : Json(fmt::to_string(x)); }
+Json number_or_name(Real x) { return std::isfinite(x) ? Json(x) : Json(fmt::to_string(x)); }
 
 template <class List>
 Json numbers(const List& list) {
   Json result = Json::array();
-  for (const Real x : list) result.push_back(number(x));
+  for (const Real x : list) result.push_back(number_or_name(x));
   return result;
 }
 
@@ -81,23 +81,23 @@ Json replay_json(const Replay& replay) {
                {"precision", to_string(replay.precision)},
                {"origin", vector(replay.world.origin)},
                {"direction", vector(replay.world.direction)},
-               {"begin", number(replay.world.begin)},
-               {"end", number(replay.world.end)},
+               {"begin", number_or_name(replay.world.begin)},
+               {"end", number_or_name(replay.world.end)},
                {"lookups", replay.lookups},
                {"draws", numbers(replay.draws)},
                {"values", Json::array()},
                {"steps", Json::array()}};
   for (std::size_t o = 0; o < replay.values.size(); ++o)
     json["values"].push_back({{"output", replay.outputs[o]},
-                              {"value", number(replay.values[o])},
-                              {"target", replay.targets[o] ? number(*replay.targets[o]) : Json()}});
+                              {"value", number_or_name(replay.values[o])},
+                              {"target", replay.targets[o] ? number_or_name(*replay.targets[o]) : Json()}});
   const Recording::Walk& walk = replay.walk;
   for (std::size_t i = 0; i < walk.steps.size(); ++i) {
     const Recording::Step& step = walk.steps[i];
-    Json entry = {{"position", number(step.position)},
+    Json entry = {{"position", number_or_name(step.position)},
                   {"point", vector(replay.world.at(step.position))},
-                  {"majorant_depth", number(step.depth)},
-                  {"majorant", step.rate > 0 ? number(step.rate) : Json()},
+                  {"majorant_depth", number_or_name(step.depth)},
+                  {"majorant", step.rate > 0 ? number_or_name(step.rate) : Json()},
                   {"extinction", numbers(of_step(walk.extinction, i, replay.channels))},
                   {"draws", step.draws}};
     if (!replay.transmittance.empty()) entry["transmittance"] = numbers(of_step(replay.transmittance, i, replay.channels));

@@ -19,22 +19,18 @@
 namespace nullmark {
 namespace {
 
-constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
 constexpr Real kNotANumber = std::numeric_limits<Real>::quiet_NaN();
 
 const std::vector<std::string> kStatus = {"ok", "skipped", "not_run", "error"};
-
-Json real(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
-Json real(const std::optional<Real>& x) { return x ? real(*x) : Json(nullptr); }
 
 int outputs_of(const CellRecord& record) {
   return record.outputs.empty() ? record.channels : static_cast<int>(record.outputs.size());
 }
 
 Json reals(const std::vector<std::optional<Real>>& values, int outputs) {
-  if (outputs == 1) return values.empty() ? Json(nullptr) : real(values[0]);
+  if (outputs == 1) return values.empty() ? Json(nullptr) : number_or_null(values[0]);
   Json list = Json::array();
-  for (const std::optional<Real>& value : values) list.push_back(real(value));
+  for (const std::optional<Real>& value : values) list.push_back(number_or_null(value));
   return list.empty() ? Json(nullptr) : list;
 }
 
@@ -68,30 +64,30 @@ Json time_json(const CellRecord& record) {
   if (!record.time) return nullptr;
   const TimeRecord& time = *record.time;
   Json repetitions = Json::array();
-  for (const Real ns : time.repetition_ns) repetitions.push_back(real(ns));
+  for (const Real ns : time.repetition_ns) repetitions.push_back(number_or_null(ns));
   Json batches = Json::array();
   for (const BatchTime& batch : time.batches)
     batches.push_back({{"samples_per_traversal", batch.samples_per_traversal},
-                       {"ns_per_sample", real(batch.ns_per_sample)},
-                       {"mad", real(batch.mad)}});
+                       {"ns_per_sample", number_or_null(batch.ns_per_sample)},
+                       {"mad", number_or_null(batch.mad)}});
   const std::optional<Cost> cost = cost_of(record);
   const std::optional<Interval> to_one_percent = cost ? seconds_to(*cost, 0.01) : std::nullopt;
-  return {{"ns_per_sample", real(time.ns_per_sample)},
-          {"ns_per_lookup", real(time.ns_per_lookup)},
-          {"floor_ratio", real(time.floor_ratio)},
-          {"memory_ratio", time.memory_ratio > 0 ? real(time.memory_ratio) : Json()},
-          {"loop_ratio", real(time.loop_ratio)},
+  return {{"ns_per_sample", number_or_null(time.ns_per_sample)},
+          {"ns_per_lookup", number_or_null(time.ns_per_lookup)},
+          {"floor_ratio", number_or_null(time.floor_ratio)},
+          {"memory_ratio", time.memory_ratio > 0 ? number_or_null(time.memory_ratio) : Json()},
+          {"loop_ratio", number_or_null(time.loop_ratio)},
           {"repetitions", time.repetitions},
-          {"mad", real(time.mad)},
-          {"waiting", real(time.waiting)},
+          {"mad", number_or_null(time.mad)},
+          {"waiting", number_or_null(time.waiting)},
           {"threads", time.threads},
           {"traversal_included", true},
           {"samples_per_traversal", time.samples_per_traversal},
           {"batches", std::move(batches)},
           {"repetition_ns", std::move(repetitions)},
-          {"majorant_build_seconds", real(time.majorant_build_seconds)},
+          {"majorant_build_seconds", number_or_null(time.majorant_build_seconds)},
           {"variance_x_ns", per_channel(record, [&](std::size_t c) { return variance_x_ns(record, c); })},
-          {"seconds_to_1pct", real(to_one_percent ? std::optional(to_one_percent->value) : std::nullopt)}};
+          {"seconds_to_1pct", number_or_null(to_one_percent ? std::optional(to_one_percent->value) : std::nullopt)}};
 }
 
 Json convergence_json(const CellRecord& record) {
@@ -114,7 +110,7 @@ std::optional<Real> optional_real(const Place& object, const char* key) {
 
 Real real_or_nan(const Place& object, const char* key) { return optional_real(object, key).value_or(kNotANumber); }
 
-std::uint64_t count(const Place& object, const char* key) { return object.has(key) ? object[key].unsigned_integer(0, kAny) : 0; }
+std::uint64_t count(const Place& object, const char* key) { return object.has(key) ? object[key].unsigned_integer(0) : 0; }
 
 std::string string_or_empty(const Place& object, const char* key) {
   return object.has(key) && !object[key].json().is_null() ? object[key].string() : "";
@@ -210,8 +206,8 @@ TimeRecord read_time(const Place& place) {
   time.samples_per_traversal = count(place, "samples_per_traversal");
   if (place.has("batches"))
     for (const Place& batch : place["batches"].elements())
-      time.batches.push_back({batch["samples_per_traversal"].unsigned_integer(1, kAny), real_or_nan(batch, "ns_per_sample"),
-                              real_or_nan(batch, "mad")});
+      time.batches.push_back(
+          {batch["samples_per_traversal"].unsigned_integer(1), real_or_nan(batch, "ns_per_sample"), real_or_nan(batch, "mad")});
   time.majorant_build_seconds = real_or_nan(place, "majorant_build_seconds");
   if (place.has("repetition_ns"))
     for (const Place& ns : place["repetition_ns"].elements())
@@ -279,7 +275,7 @@ Json cell_json(const CellRecord& record) {
   json.update(Json{
       {"samples", record.samples}, {"seed", cell.seed}, {"own_streams", cell.own_streams}, {"status", to_string(record.status)}});
   if (!record.reason.empty()) json["reason"] = record.reason;
-  if (record.reliance) json["reliance"] = real(record.reliance);
+  if (record.reliance) json["reliance"] = number_or_null(record.reliance);
   json.update(Json{
       {"mean", field(record, &ChannelRecord::mean)},
       {"reference",
@@ -296,23 +292,23 @@ Json cell_json(const CellRecord& record) {
       {"variance_basis", record.variance_basis},
       {"relative_variance", field(record, &ChannelRecord::relative_variance)},
       {"kurtosis", field(record, &ChannelRecord::kurtosis)},
-      {"lookups_per_sample", real(record.lookups_per_sample)},
-      {"lookups_theory", real(record.lookups_theory)},
-      {"null_collisions_per_sample", real(record.null_collisions_per_sample)},
-      {"rng_draws_per_sample", real(record.draws_per_sample)},
+      {"lookups_per_sample", number_or_null(record.lookups_per_sample)},
+      {"lookups_theory", number_or_null(record.lookups_theory)},
+      {"null_collisions_per_sample", number_or_null(record.null_collisions_per_sample)},
+      {"rng_draws_per_sample", number_or_null(record.draws_per_sample)},
       {"lookups", record.lookups},
       {"rng_draws", record.draws},
-      {"lookups_variance", real(record.lookups_variance)},
+      {"lookups_variance", number_or_null(record.lookups_variance)},
       {"squared_error_blocks", record.squared_error_blocks},
       {"majorant_violations", record.majorant_violations},
-      {"largest_violation", real(record.largest_violation)},
-      {"largest_sample", real(record.largest_sample)},
+      {"largest_violation", number_or_null(record.largest_violation)},
+      {"largest_sample", number_or_null(record.largest_sample)},
       {"nonfinite", record.nonfinite},
       {"verdict", record.verdict ? verdict_json(*record.verdict) : Json(nullptr)},
       {"time", time_json(record)},
       {"efficiency", {{"variance_x_lookups", per_channel(record, [&](std::size_t c) { return variance_x_lookups(record, c); })}}},
       {"convergence", convergence_json(record)},
-      {"image_maximum", real(cell.image_maximum)}});
+      {"image_maximum", number_or_null(cell.image_maximum)}});
   if (record.instructions) json["instructions"] = *record.instructions;
   if (cell.images) json["images"] = record.images;
   return json;
@@ -348,11 +344,11 @@ CellRecord read_cell(const Place& place) {
     for (const Place& output : place["outputs"].elements()) record.outputs.push_back(output.string());
   record.effects.clear();
   for (const Place& effect : place["effects"].elements()) record.effects.push_back(effect.string());
-  record.rays = place["rays"].unsigned_integer(0, kAny);
-  cell.samples_per_ray = place["samples_per_ray"].unsigned_integer(0, kAny);
+  record.rays = place["rays"].unsigned_integer(0);
+  cell.samples_per_ray = place["samples_per_ray"].unsigned_integer(0);
   cell.equal_lookups = optional_real(place, "equal_lookups");
-  record.samples = place["samples"].unsigned_integer(0, kAny);
-  cell.seed = place["seed"].unsigned_integer(0, kAny);
+  record.samples = place["samples"].unsigned_integer(0);
+  cell.seed = place["seed"].unsigned_integer(0);
   cell.own_streams = place["own_streams"].boolean();
   const std::string status = place["status"].one_of(kStatus, "status");
   record.status = static_cast<Status>(std::find(kStatus.begin(), kStatus.end(), status) - kStatus.begin());
@@ -378,7 +374,7 @@ CellRecord read_cell(const Place& place) {
   if (place.has("time") && !place["time"].json().is_null()) record.time = read_time(place["time"]);
   if (place.has("convergence"))
     for (const Place& step : place["convergence"].elements())
-      record.convergence.push_back({step["samples"].unsigned_integer(0, kAny), read_reals(step, "rmse", outputs_of(record)),
+      record.convergence.push_back({step["samples"].unsigned_integer(0), read_reals(step, "rmse", outputs_of(record)),
                                     read_reals(step, "variance", outputs_of(record))});
   cell.image_maximum = optional_real(place, "image_maximum").value_or(1);
   cell.images = place.has("images");

@@ -13,13 +13,9 @@ namespace {
 /// Numbers that a sample gives at most: a free path's scores in every channel.
 constexpr int kMaxOutputs = kMaxChannels * (static_cast<int>(kFreePathBins) + 3);
 
-constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
-
 const std::vector<std::string> kOutcomes = {"", "PASS", "FAIL", "INCONCLUSIVE", "VIOLATED"};
 
 const std::vector<std::string> kBases = {"betting", "catoni", "catoni+betting", "deterministic", "none", "counted"};
-
-Json real(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 
 Json outcome_json(Outcome outcome) { return outcome == Outcome::none ? Json(nullptr) : Json(to_string(outcome)); }
 
@@ -35,18 +31,22 @@ Real read_real(const Place& object, const char* key, Real instead) {
 }
 
 Json test_json(const TestRecord& test) {
-  Json json = {{"channel", test.channel},           {"samples", test.samples},
-               {"epsilon", real(test.epsilon)},     {"reference_error", real(test.reference_error)},
-               {"variance", real(test.variance)},   {"basis", test.basis},
-               {"reference", real(test.reference)}, {"mean_error", real(test.mean_error)}};
+  Json json = {{"channel", test.channel},
+               {"samples", test.samples},
+               {"epsilon", number_or_null(test.epsilon)},
+               {"reference_error", number_or_null(test.reference_error)},
+               {"variance", number_or_null(test.variance)},
+               {"basis", test.basis},
+               {"reference", number_or_null(test.reference)},
+               {"mean_error", number_or_null(test.mean_error)}};
   if (test.deterministic()) {
-    json["largest_error"] = real(test.largest_error);
-    json["rounding"] = real(test.rounding);
+    json["largest_error"] = number_or_null(test.largest_error);
+    json["rounding"] = number_or_null(test.rounding);
   } else {
-    json["log_e"] = {{"fail", real(test.log_e_fail)},
-                     {"low", real(test.log_e_low)},
-                     {"high", real(test.log_e_high)},
-                     {"beyond", real(test.log_e_beyond)}};
+    json["log_e"] = {{"fail", number_or_null(test.log_e_fail)},
+                     {"low", number_or_null(test.log_e_low)},
+                     {"high", number_or_null(test.log_e_high)},
+                     {"beyond", number_or_null(test.log_e_beyond)}};
     json["planned"] = test.planned;
     json["rates"] = test.rates;
   }
@@ -57,9 +57,9 @@ Json test_json(const TestRecord& test) {
 /// The ray groups of a channel, one figure a list: they are many.
 Json groups_json(const std::vector<const TestRecord*>& groups) {
   const TestRecord& first = *groups.front();
-  Json json = {{"epsilon", real(first.epsilon)}, {"samples", first.samples}};
+  Json json = {{"epsilon", number_or_null(first.epsilon)}, {"samples", first.samples}};
   const auto list = [&](const char* key, Real TestRecord::*figure) {
-    for (const TestRecord* test : groups) json[key].push_back(real(test->*figure));
+    for (const TestRecord* test : groups) json[key].push_back(number_or_null(test->*figure));
   };
   for (const TestRecord* test : groups) json["basis"].push_back(test->basis);
   list("reference_error", &TestRecord::reference_error);
@@ -80,7 +80,7 @@ TestRecord read_test(const Place& place) {
   place.expect_object();
   TestRecord test;
   test.channel = static_cast<int>(place["channel"].integer(-1, kMaxOutputs - 1));
-  test.samples = place["samples"].unsigned_integer(0, kAny);
+  test.samples = place["samples"].unsigned_integer(0);
   test.epsilon = read_real(place, "epsilon", 0);
   test.reference_error = read_real(place, "reference_error", kInfinity);
   test.variance = read_real(place, "variance", kInfinity);
@@ -96,7 +96,7 @@ TestRecord read_test(const Place& place) {
     test.log_e_low = read_real(log_e, "low", -kInfinity);
     test.log_e_high = read_real(log_e, "high", -kInfinity);
     test.log_e_beyond = read_real(log_e, "beyond", -kInfinity);
-    test.planned = place["planned"].unsigned_integer(0, kAny);
+    test.planned = place["planned"].unsigned_integer(0);
     if (place.has("rates"))
       for (const Place& rate : place["rates"].elements())
         if (!rate.json().is_null()) test.rates.push_back(rate.number());
@@ -121,7 +121,7 @@ void read_groups(const Place& place, int channel, std::vector<TestRecord>& tests
     groups[i].group = static_cast<int>(i);
     groups[i].basis = basis[i].one_of(kBases, "basis");
     groups[i].epsilon = read_real(place, "epsilon", 0);
-    groups[i].samples = place["samples"].unsigned_integer(0, kAny);
+    groups[i].samples = place["samples"].unsigned_integer(0);
     groups[i].largest_error = kInfinity;
     groups[i].log_e_beyond = -kInfinity;
   }
@@ -151,8 +151,10 @@ Json verdict_json(const VerdictRecord& verdict) {
   }
   Json laws = Json::array();
   for (const LawRecord& law : verdict.laws)
-    laws.push_back(
-        {{"name", law.name}, {"log_e", real(law.log_e)}, {"samples", law.samples}, {"outcome", outcome_json(law.outcome)}});
+    laws.push_back({{"name", law.name},
+                    {"log_e", number_or_null(law.log_e)},
+                    {"samples", law.samples},
+                    {"outcome", outcome_json(law.outcome)}});
   Json proven = Json::array();
   if (verdict.within) proven.push_back("within");
   if (verdict.beyond) proven.push_back("beyond");
@@ -202,22 +204,22 @@ VerdictRecord read_verdict(const Place& place) {
   if (place.has("tolerate") && place["tolerate"].one_of(tolerances(), "bias to tolerate") == tolerances()[1])
     verdict.tolerate = Tolerate::epsilon;
   if (place.has("bound_unproven")) verdict.bound_unproven = place["bound_unproven"].boolean();
-  if (place.has("counted_walks")) verdict.counted_walks = place["counted_walks"].unsigned_integer(0, kAny);
+  if (place.has("counted_walks")) verdict.counted_walks = place["counted_walks"].unsigned_integer(0);
   if (place.has("untested"))
     for (const Place& law : place["untested"].elements()) verdict.untested.push_back(law.string());
   verdict.against = place["against"].one_of({"reference", "own mean"}, "target");
   verdict.variance_basis = place["variance_basis"].one_of({"analytic", "pilot", "none"}, "basis");
   verdict.planned_undecidable = place["planned_undecidable"].boolean();
   verdict.violated = place["violated"].boolean();
-  verdict.nonfinite = place["nonfinite"].unsigned_integer(0, kAny);
-  verdict.out_of_range = place["out_of_range"].unsigned_integer(0, kAny);
-  verdict.samples_per_ray = place["samples_per_ray"].unsigned_integer(0, kAny);
-  verdict.planned = place["planned"].unsigned_integer(0, kAny);
+  verdict.nonfinite = place["nonfinite"].unsigned_integer(0);
+  verdict.out_of_range = place["out_of_range"].unsigned_integer(0);
+  verdict.samples_per_ray = place["samples_per_ray"].unsigned_integer(0);
+  verdict.planned = place["planned"].unsigned_integer(0);
   // Files without a tolerance are of before PASS took the planned samples.
   if (!place.has("tolerate")) verdict.planned = std::min(verdict.planned, verdict.samples_per_ray);
-  verdict.affordable = place["affordable"].unsigned_integer(0, kAny);
-  verdict.family = place["family"].unsigned_integer(1, kAny);
-  verdict.lookups_family = place["lookups_family"].unsigned_integer(1, kAny);
+  verdict.affordable = place["affordable"].unsigned_integer(0);
+  verdict.family = place["family"].unsigned_integer(1);
+  verdict.lookups_family = place["lookups_family"].unsigned_integer(1);
   const auto level = [&](const char* key) {
     const Real value = place[key].number();
     if (!(value > 0 && value < 1)) place[key].expected("a number between 0 and 1");
@@ -229,9 +231,9 @@ VerdictRecord read_verdict(const Place& place) {
     verdict.tests.push_back(read_test(test));
     if (test.has("groups")) read_groups(test["groups"], verdict.tests.back().channel, verdict.tests);
   }
-  verdict.laws_family = place["laws_family"].unsigned_integer(1, kAny);
+  verdict.laws_family = place["laws_family"].unsigned_integer(1);
   for (const Place& law : place["laws"].elements())
-    verdict.laws.push_back({law["name"].string(), read_real(law, "log_e", kInfinity), law["samples"].unsigned_integer(0, kAny),
+    verdict.laws.push_back({law["name"].string(), read_real(law, "log_e", kInfinity), law["samples"].unsigned_integer(0),
                             read_outcome(law["outcome"])});
   verdict.lawful = read_outcome(place["lawful"]);
   return verdict;

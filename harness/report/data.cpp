@@ -28,26 +28,25 @@ namespace {
 
 using Places = std::map<const CellRecord*, std::size_t>;
 
-Json number(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
-Json number(const std::optional<Real>& x) { return x ? number(*x) : Json(nullptr); }
-
-Json interval(const Interval& x) { return {{"value", number(x.value)}, {"low", number(x.low)}, {"high", number(x.high)}}; }
+Json interval(const Interval& x) {
+  return {{"value", number_or_null(x.value)}, {"low", number_or_null(x.low)}, {"high", number_or_null(x.high)}};
+}
 Json interval(const std::optional<Interval>& x) { return x ? interval(*x) : Json(nullptr); }
 
 Json place(const std::optional<std::size_t>& at) { return at ? Json(*at) : Json(nullptr); }
 
 Json per_output(const CellRecord& record, std::optional<Real> ChannelRecord::*member) {
   Json list = Json::array();
-  for (const ChannelRecord& channel : record.channel) list.push_back(number(channel.*member));
+  for (const ChannelRecord& channel : record.channel) list.push_back(number_or_null(channel.*member));
   return list;
 }
 
 Json time_row(const CellRecord& record) {
   if (!record.time) return nullptr;
   return {{"ns_per_sample", interval(median_interval(record.time->repetition_ns))},
-          {"ns_per_lookup", number(record.time->ns_per_lookup)},
-          {"floor_ratio", number(record.time->floor_ratio)},
-          {"loop_ratio", number(record.time->loop_ratio)}};
+          {"ns_per_lookup", number_or_null(record.time->ns_per_lookup)},
+          {"floor_ratio", number_or_null(record.time->floor_ratio)},
+          {"loop_ratio", number_or_null(record.time->loop_ratio)}};
 }
 
 Json verdict_json_of(const CellRecord& record) {
@@ -59,7 +58,9 @@ Json verdict_json_of(const CellRecord& record) {
     evidence = std::max(evidence, test.log_e_fail);
     if (test.group < 0) epsilon = std::max(epsilon, test.epsilon);
   }
-  return {{"epsilon", number(epsilon)}, {"log_e_fail", number(evidence)}, {"samples_per_ray", verdict.samples_per_ray}};
+  return {{"epsilon", number_or_null(epsilon)},
+          {"log_e_fail", number_or_null(evidence)},
+          {"samples_per_ray", verdict.samples_per_ray}};
 }
 
 Json cost_json(const Contender& contender) {
@@ -75,7 +76,7 @@ Json cost_json(const Contender& contender) {
     seconds.push_back(std::move(entry));
   }
   return {{"basis", cost.analytic ? "analytic" : "sample"},
-          {"reference", number(cost.reference)},
+          {"reference", number_or_null(cost.reference)},
           {"variance", interval(cost.variance)},
           {"variance_x_lookups", interval(cost.variance_x_lookups)},
           {"variance_x_ns", interval(cost.variance_x_ns)},
@@ -113,11 +114,12 @@ Json convergence_row(const CellRecord& record, const std::optional<Cost>& cost) 
     const Real groups = static_cast<Real>(record.rays) * std::floor(static_cast<Real>(record.cell.samples_per_ray) / n);
     const Real scatter = groups > 0 ? std::sqrt(std::max<Real>(0, 2 + excess / n) / groups) : kInfinity;
     const std::optional<Interval> ns = sample_time(*cost, step.samples);
-    list.push_back({{"samples", step.samples},
-                    {"lookups", number(record.lookups_per_sample ? std::optional(n * *record.lookups_per_sample) : std::nullopt)},
-                    {"seconds", ns ? interval(product(*ns, exactly(n * 1e-9))) : Json(nullptr)},
-                    {"rmse", interval(relative(std::sqrt(square) / cost->reference, scatter / 2))},
-                    {"variance", interval(relative(variance, scatter))}});
+    list.push_back(
+        {{"samples", step.samples},
+         {"lookups", number_or_null(record.lookups_per_sample ? std::optional(n * *record.lookups_per_sample) : std::nullopt)},
+         {"seconds", ns ? interval(product(*ns, exactly(n * 1e-9))) : Json(nullptr)},
+         {"rmse", interval(relative(std::sqrt(square) / cost->reference, scatter / 2))},
+         {"variance", interval(relative(variance, scatter))}});
   }
   return list;
 }
@@ -140,7 +142,7 @@ std::vector<std::string> mark_names(const CellRecord& record) {
 Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& images, const std::string& file) {
   const Cell& cell = record.cell;
   Json parameters = Json::object();
-  for (const auto& [name, value] : numeric_parameters(record)) parameters[name] = number(value);
+  for (const auto& [name, value] : numeric_parameters(record)) parameters[name] = number_or_null(value);
   return {{"run", run},
           {"scene", nullptr},
           {"id", cell.id},
@@ -173,12 +175,12 @@ Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& image
           {"rmse_theory", per_output(record, &ChannelRecord::rmse_theory)},
           {"variance", per_output(record, &ChannelRecord::variance)},
           {"variance_theory", per_output(record, &ChannelRecord::variance_theory)},
-          {"lookups", number(record.lookups_per_sample)},
-          {"lookups_theory", number(record.lookups_theory)},
-          {"null_collisions", number(record.null_collisions_per_sample)},
+          {"lookups", number_or_null(record.lookups_per_sample)},
+          {"lookups_theory", number_or_null(record.lookups_theory)},
+          {"null_collisions", number_or_null(record.null_collisions_per_sample)},
           {"violations", record.majorant_violations},
-          {"largest_violation", number(record.largest_violation)},
-          {"draws", number(record.draws_per_sample)},
+          {"largest_violation", number_or_null(record.largest_violation)},
+          {"draws", number_or_null(record.draws_per_sample)},
           {"time", time_row(record)},
           {"verdict", verdict_json_of(record)},
           {"cost", nullptr},
@@ -262,7 +264,7 @@ Json table_json(const Table& table, const CellsByName& cells, const Places& plac
   for (const TableRow& row : table.rows) {
     Json values = Json::array(), of_cells = Json::array();
     const auto add = [&](const std::optional<Real>& value, const std::string* cell) {
-      values.push_back(number(value));
+      values.push_back(number_or_null(value));
       const auto at = cell ? cells.find(*cell) : cells.end();
       of_cells.push_back(at == cells.end() ? Json(nullptr) : Json(places.at(at->second)));
     };
@@ -325,7 +327,7 @@ Json scaling_json(const std::vector<RunRecord>& runs, const Places& places) {
         points.push_back({{"x", series.x[i]},
                           {"cell", places.at(&record)},
                           {"ns_per_sample", record.time ? interval(median_interval(record.time->repetition_ns)) : Json(nullptr)},
-                          {"lookups", number(record.lookups_per_sample)}});
+                          {"lookups", number_or_null(record.lookups_per_sample)}});
       }
       list.push_back({{"axis", series.axis},
                       {"estimator", series.tracker},
