@@ -12,12 +12,23 @@ namespace {
 
 using Combinations = std::array<std::string, 4>;
 
+/// "/optical_depth:3" of "linear/lo:0.2,0,0/optical_depth:3": what the label says beside the type and the box.
+std::string depth_of(const MediumSpec& medium) {
+  std::string depth;
+  for (std::size_t at = medium.label.find('/'); at != std::string::npos;) {
+    const std::size_t next = medium.label.find('/', at + 1);
+    const std::string part = medium.label.substr(at, next - at);
+    if (!part.starts_with("/lo:") && !part.starts_with("/hi:")) depth += part;
+    at = next;
+  }
+  return depth;
+}
+
 Combinations combinations_of(const Plan& plan, const Cell& cell) {
   const MediumSpec& medium = plan.media[cell.medium];
   const std::string &estimator = cell.estimator.label, &type = medium.field.type, &majorant = plan.majorants[cell.majorant].label;
-  const std::string parameters = medium.label.substr(std::min(type.size(), medium.label.size()));
   return {fmt::format("estimator {} medium {}", estimator, type), fmt::format("medium {} majorant {}", type, majorant),
-          fmt::format("estimator {} parameters {}", estimator, parameters),
+          fmt::format("estimator {} depth {}", estimator, depth_of(medium)),
           fmt::format("estimator {} majorant {} experiment {}", estimator, majorant, cell.experiment)};
 }
 

@@ -8,7 +8,7 @@ namespace nullmark {
 
 /// A part of a plan that meets every combination which the whole plan meets of
 ///
-///   estimator and medium type, medium type and majorant, estimator and medium parameters (its depth, extents, ...),
+///   estimator and medium type, medium type and majorant, estimator and depth (what a medium takes beside its box),
 ///   estimator, majorant and experiment
 ///
 /// Chosen greedily: the cell with the most combinations not met yet comes first, the earlier one of equals.  One entry a cell.
