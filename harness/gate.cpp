@@ -376,7 +376,8 @@ class GatePlanner {
       }
       // A variance near rounding is one of the tracker's arithmetic.
       constexpr Real kAboveRounding = 1e4, kTheoryError = 2e-3;
-      if (!(total / static_cast<Real>(rays_) > kAboveRounding * mean.rounding * mean.rounding)) continue;
+      if (!std::isfinite(reference) || !(total / static_cast<Real>(rays_) > kAboveRounding * mean.rounding * mean.rounding))
+        continue;
       MeanTest test;
       test.channel = mean.channel;
       test.rays = rays_;

@@ -196,7 +196,12 @@ Spectrum position_error(const BuiltMedium& medium, const Ray& world, const Ray& 
   const Real origin = local.origin.cwiseAbs().maxCoeff();
   const Real lengths =
       std::max({std::max(coordinates, origin) / local.direction.norm(), std::abs(world.begin), std::abs(world.end)});
-  return 4 * kEpsilon * lengths * medium.extrema.maximum;
+  const Real error = 4 * kEpsilon * lengths;
+  if (medium.extrema.maximum.allFinite()) return error * medium.extrema.maximum;
+  // Where the medium has a pole, what the ray can meet bounds it.
+  const Vec3 from = local.at(local.begin), to = local.at(local.end);
+  const Vec3 reach = Vec3::Constant(error * std::max<Real>(1, local.direction.norm()));
+  return error * medium.medium->extrema({from.cwiseMin(to) - reach, from.cwiseMax(to) + reach}).maximum;
 }
 
 }  // namespace
