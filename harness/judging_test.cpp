@@ -148,6 +148,19 @@ TEST(Judging, FarCoordinatesAreNoBias) {
   }
 }
 
+/// The extinction is unbounded at y = 0, which the ray does not touch.
+TEST(Judging, APoleElsewhereIsNoBias) {
+  const auto records = run(
+      R"("samples_per_ray":200000,"gate":{"epsilon":0.02,"laws":"always"},
+         "matrix":{"estimator":["ratio","next_flight_ratio"],"medium":{"type":"exponential_cube","axis":"y"},
+                   "majorant":{"type":"prescribed","value":2}})");
+  for (const CellRecord& record : records) {
+    EXPECT_LT(record.channel.at(0).reference_error.value_or(kInfinity), 1e-12);
+    EXPECT_EQ(record.verdict.value().unbiased, Outcome::pass) << record.verdict->reason;
+    EXPECT_NE(record.verdict->lawful, Outcome::fail);
+  }
+}
+
 /// A stated variance that is too small, or of samples with a range too large, is no variance to rest a proof on.
 TEST(Judging, StatedVariancesAreTested) {
   const std::string cell =
