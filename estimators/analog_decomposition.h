@@ -1,8 +1,8 @@
 #pragma once
 
 #include "estimators/estimator.h"
-#include "estimators/kinks.h"
-#include "estimators/survival.h"
+#include "estimators/theory/kinks.h"
+#include "estimators/theory/survival.h"
 
 namespace nullmark {
 

@@ -9,12 +9,12 @@
 #include <cmath>
 #include <random>
 
-#include "estimators/debiased_theory.h"
-#include "estimators/hand_walked.h"
 #include "estimators/jackknife.h"
 #include "estimators/telescoping.h"
+#include "estimators/theory/debiased_theory.h"
 #include "estimators/unbiased_ray_marching.h"
-#include "media/built_media.h"
+#include "harness/testing/built_media.h"
+#include "harness/testing/hand_walked.h"
 #include "media/exponential.h"
 #include "media/layers.h"
 

@@ -3,7 +3,7 @@
 #include <variant>
 
 #include "estimators/estimator.h"
-#include "estimators/survival.h"
+#include "estimators/theory/survival.h"
 
 namespace nullmark {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <vector>
 
-#include "estimators/rng.h"
-#include "media/elementary.h"
+#include "estimators/walk/rng.h"
+#include "media/base/elementary.h"
 
 namespace nullmark {
 namespace {

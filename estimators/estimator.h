@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "estimators/event.h"
-#include "estimators/flight.h"
-#include "estimators/ray_profile.h"
+#include "estimators/theory/ray_profile.h"
+#include "estimators/walk/event.h"
+#include "estimators/walk/flight.h"
+#include "media/base/parameters.h"
+#include "media/base/value.h"
 #include "media/majorants/majorant.h"
-#include "media/parameters.h"
-#include "media/value.h"
 
 namespace nullmark {
 

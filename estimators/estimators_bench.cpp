@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
-#include "harness/bench_kernel.h"
-#include "harness/calibration.h"
+#include "harness/sampling/reference_loops.h"
+#include "harness/testing/bench_kernel.h"
 
 namespace nullmark {
 namespace {

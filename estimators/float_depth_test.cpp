@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "estimators/lane_rng.h"
+#include "estimators/walk/lane_rng.h"
 
 namespace nullmark {
 namespace {
@@ -23,8 +23,8 @@ std::vector<float> every_exponential() {
   return rest;
 }
 
-/// P(e > t) of a flight, which is what delta tracking, and ratio tracking under a bound that equals the extinction, estimate T by:
-/// off by less than one of 2^24 random numbers, and by a last digit of t.  So T is within epsilon down to 2^-24/epsilon.
+/// P(e > t) of a flight, which is what delta tracking, and ratio tracking under a bound that equals the extinction, estimate T
+/// by: off by less than one of 2^24 random numbers, and by a last digit of t.  So T is within epsilon down to 2^-24/epsilon.
 TEST(FloatDepth, AFlightKeepsItsLawDownToOneRandomNumber) {
   const std::vector<float> all = every_exponential();
   const auto escapes = [&](float depth) {

@@ -7,11 +7,11 @@
 #include <memory>
 #include <string>
 
-#include "estimators/hand_walked.h"
 #include "every_estimator.h"
-#include "harness/lane_kernel.h"
-#include "media/built_media.h"
-#include "media/channels.h"
+#include "harness/kernel/lane_kernel.h"
+#include "harness/testing/built_media.h"
+#include "harness/testing/hand_walked.h"
+#include "media/base/channels.h"
 #include "media/layers.h"
 
 namespace nullmark {

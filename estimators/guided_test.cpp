@@ -7,13 +7,13 @@
 #include <cmath>
 #include <random>
 
-#include "estimators/guided_theory.h"
-#include "estimators/hand_walked.h"
 #include "estimators/majorant_guided_ratio.h"
 #include "estimators/progressive_majorant.h"
 #include "estimators/taylor_pink_noise.h"
-#include "media/built_media.h"
-#include "media/channels.h"
+#include "estimators/theory/guided_theory.h"
+#include "harness/testing/built_media.h"
+#include "harness/testing/hand_walked.h"
+#include "media/base/channels.h"
 #include "media/exponential.h"
 #include "media/layers.h"
 

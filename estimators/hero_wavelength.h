@@ -3,10 +3,10 @@
 #include <numeric>
 
 #include "estimators/estimator.h"
-#include "estimators/event_choice.h"
-#include "estimators/kinks.h"
-#include "estimators/log_factorial.h"
-#include "estimators/survival.h"
+#include "estimators/theory/kinks.h"
+#include "estimators/theory/log_factorial.h"
+#include "estimators/theory/survival.h"
+#include "estimators/walk/event_choice.h"
 
 namespace nullmark {
 
@@ -97,8 +97,7 @@ struct HeroWavelengthTracking {
     }
     if (seen < profile.optical_depth(c) * (1 - 1e-12)) theory.mean = std::exp(-seen);
     std::vector<Real> through = rate;
-    for (std::size_t j = 0; j < rate.size(); ++j)
-      through[j] -= std::min(profile.nodes(c)[j].extinction, rate[j]);
+    for (std::size_t j = 0; j < rate.size(); ++j) through[j] -= std::min(profile.nodes(c)[j].extinction, rate[j]);
     state_lookups(theory, profile, rate, through, alive);
     if (ray.channels == 1) theory.variance = std::exp(-seen) * -std::expm1(-seen);
     if (ray.channels > 1) theory.lookups_variance.reset();

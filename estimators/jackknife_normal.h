@@ -2,8 +2,8 @@
 
 #include <numbers>
 
-#include "estimators/debiased_theory.h"
 #include "estimators/estimator.h"
+#include "estimators/theory/debiased_theory.h"
 
 namespace nullmark {
 

@@ -2,9 +2,9 @@
 
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 
-#include "harness/bench_kernel.h"
-#include "harness/calibration.h"
-#include "harness/names.h"
+#include "harness/model/names.h"
+#include "harness/sampling/reference_loops.h"
+#include "harness/testing/bench_kernel.h"
 
 namespace nullmark {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "estimators/estimator.h"
-#include "estimators/guided_theory.h"
+#include "estimators/theory/guided_theory.h"
 
 namespace nullmark {
 

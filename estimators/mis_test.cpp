@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
-#include "estimators/hand_walked.h"
 #include "estimators/mis_bidirectional.h"
 #include "estimators/mis_unidirectional.h"
-#include "media/built_media.h"
+#include "harness/testing/built_media.h"
+#include "harness/testing/hand_walked.h"
 
 namespace nullmark {
 namespace {

@@ -1,9 +1,9 @@
 #pragma once
 
 #include "estimators/estimator.h"
-#include "estimators/event_choice.h"
-#include "estimators/kinks.h"
-#include "estimators/survival.h"
+#include "estimators/theory/kinks.h"
+#include "estimators/theory/survival.h"
+#include "estimators/walk/event_choice.h"
 
 namespace nullmark {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "estimators/estimator.h"
-#include "estimators/log_factorial.h"
+#include "estimators/theory/log_factorial.h"
 
 namespace nullmark {
 

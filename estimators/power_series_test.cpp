@@ -6,13 +6,13 @@
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <cmath>
 
-#include "estimators/hand_walked.h"
 #include "estimators/p_series_cmf.h"
 #include "estimators/p_series_cumulative.h"
 #include "estimators/p_series_next_flight.h"
 #include "estimators/p_series_ratio.h"
-#include "media/built_media.h"
-#include "media/channels.h"
+#include "harness/testing/built_media.h"
+#include "harness/testing/hand_walked.h"
+#include "media/base/channels.h"
 
 namespace nullmark {
 namespace {

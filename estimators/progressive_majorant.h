@@ -1,7 +1,7 @@
 #pragma once
 
 #include "estimators/estimator.h"
-#include "estimators/kinks.h"
+#include "estimators/theory/kinks.h"
 
 namespace nullmark {
 

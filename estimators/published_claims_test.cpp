@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "harness/config.h"
-#include "harness/run_untimed.h"
+#include "harness/config/config.h"
+#include "harness/testing/run_untimed.h"
 
 namespace nullmark {
 namespace {

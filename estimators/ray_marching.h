@@ -1,7 +1,7 @@
 #pragma once
 
 #include "estimators/estimator.h"
-#include "estimators/march_theory.h"
+#include "estimators/theory/march_theory.h"
 
 namespace nullmark {
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "estimators/estimator.h"
-#include "estimators/gauss_points.h"
+#include "estimators/theory/gauss_points.h"
 
 namespace nullmark {
 

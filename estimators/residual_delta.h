@@ -1,7 +1,7 @@
 #pragma once
 
 #include "estimators/control.h"
-#include "estimators/survival.h"
+#include "estimators/theory/survival.h"
 
 namespace nullmark {
 

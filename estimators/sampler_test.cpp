@@ -9,7 +9,6 @@
 #include "estimators/analog_decomposition.h"
 #include "estimators/closed_form.h"
 #include "estimators/delta.h"
-#include "estimators/hand_walked.h"
 #include "estimators/hero_wavelength.h"
 #include "estimators/marching_inversion.h"
 #include "estimators/multi_volume.h"
@@ -20,14 +19,15 @@
 #include "estimators/spectral.h"
 #include "estimators/weighted_decomposition.h"
 #include "estimators/weighted_delta.h"
-#include "media/built_media.h"
-#include "media/channels.h"
+#include "harness/testing/built_media.h"
+#include "harness/testing/hand_walked.h"
+#include "media/base/channels.h"
+#include "media/base/sum.h"
 #include "media/cosine.h"
 #include "media/exponential.h"
 #include "media/homogeneous.h"
 #include "media/layers.h"
 #include "media/polynomial.h"
-#include "media/sum.h"
 
 namespace nullmark {
 namespace {

@@ -3,10 +3,10 @@
 #include <boost/math/special_functions/gamma.hpp>
 
 #include "estimators/estimator.h"
-#include "estimators/event_choice.h"
-#include "estimators/kinks.h"
-#include "estimators/log_factorial.h"
-#include "estimators/survival.h"
+#include "estimators/theory/kinks.h"
+#include "estimators/theory/log_factorial.h"
+#include "estimators/theory/survival.h"
+#include "estimators/walk/event_choice.h"
 
 namespace nullmark {
 

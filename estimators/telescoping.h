@@ -1,7 +1,7 @@
 #pragma once
 
-#include "estimators/debiased_theory.h"
 #include "estimators/estimator.h"
+#include "estimators/theory/debiased_theory.h"
 
 namespace nullmark {
 

@@ -3,8 +3,8 @@
 #include <numeric>
 
 #include "estimators/control.h"
-#include "estimators/kinks.h"
-#include "estimators/survival.h"
+#include "estimators/theory/kinks.h"
+#include "estimators/theory/survival.h"
 
 namespace nullmark {
 

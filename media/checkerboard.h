@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "media/field.h"
+#include "media/base/field.h"
 
 namespace nullmark {
 

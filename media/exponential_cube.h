@@ -1,6 +1,6 @@
 #pragma once
 
-#include "media/along_axis.h"
+#include "media/base/along_axis.h"
 
 namespace nullmark {
 

@@ -3,9 +3,9 @@
 #include <array>
 #include <boost/container/small_vector.hpp>
 
-#include "media/field.h"
-#include "media/lanes.h"
-#include "media/philox.h"
+#include "media/base/field.h"
+#include "media/base/lanes.h"
+#include "media/base/philox.h"
 
 namespace nullmark {
 

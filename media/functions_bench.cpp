@@ -1,10 +1,10 @@
 #include <array>
 #include <cmath>
 
-#include "harness/bench.h"
-#include "harness/calibration.h"
-#include "media/elementary.h"
-#include "media/value.h"
+#include "harness/sampling/reference_loops.h"
+#include "harness/testing/bench.h"
+#include "media/base/elementary.h"
+#include "media/base/value.h"
 
 namespace nullmark {
 namespace {

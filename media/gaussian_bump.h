@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "media/along_axis.h"
+#include "media/base/along_axis.h"
 
 namespace nullmark {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "media/field.h"
+#include "media/base/field.h"
 
 namespace nullmark {
 

@@ -1,10 +1,10 @@
 #include <cmath>
 
-#include "harness/bench.h"
-#include "harness/calibration.h"
-#include "harness/parameter_values.h"
-#include "harness/scene.h"
-#include "media/example_media.h"
+#include "harness/registry/components.h"
+#include "harness/sampling/reference_loops.h"
+#include "harness/sampling/scene.h"
+#include "harness/testing/bench.h"
+#include "harness/testing/example_media.h"
 
 namespace nullmark {
 namespace {

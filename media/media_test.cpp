@@ -10,8 +10,8 @@
 #include <set>
 #include <variant>
 
+#include "media/base/registry.h"
 #include "media/fractal_noise.h"
-#include "media/registry.h"
 
 namespace nullmark {
 namespace {

@@ -4,7 +4,7 @@
 #include <boost/container/static_vector.hpp>
 #include <cstdio>
 
-#include "media/along_axis.h"
+#include "media/base/along_axis.h"
 
 namespace nullmark {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "media/types.h"
+#include "media/base/types.h"
 
 namespace nullmark {
 

@@ -1,5 +1,5 @@
 #include "estimators/ratio.h"
-#include "harness/registry.h"
+#include "harness/registry/register_estimator.h"
 
 namespace nullmark {
 

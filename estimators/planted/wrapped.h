@@ -1,6 +1,6 @@
 #pragma once
 
-#include "harness/estimator_template.h"
+#include "harness/kernel/estimator_template.h"
 
 namespace nullmark {
 

@@ -1,5 +1,5 @@
-#include "harness/registry.h"
-#include "media/field.h"
+#include "harness/registry/register_estimator.h"
+#include "media/base/field.h"
 #include "ripples.h"
 #include "roulette_ratio.h"
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <numbers>
 
-#include "media/field.h"
+#include "media/base/field.h"
 
 namespace nullmark {
 

@@ -2,9 +2,9 @@
 
 #include <memory>
 
-#include "media/medium.h"
-#include "media/parameters.h"
-#include "media/value.h"
+#include "media/base/medium.h"
+#include "media/base/parameters.h"
+#include "media/base/value.h"
 
 namespace nullmark {
 

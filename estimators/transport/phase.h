@@ -4,8 +4,8 @@
 #include <numbers>
 #include <string>
 
-#include "media/parameters.h"
-#include "media/types.h"
+#include "media/base/parameters.h"
+#include "media/base/types.h"
 
 namespace nullmark {
 

@@ -7,7 +7,7 @@
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <vector>
 
-#include "estimators/rng.h"
+#include "estimators/walk/rng.h"
 
 namespace nullmark {
 namespace {

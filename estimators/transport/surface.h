@@ -6,7 +6,7 @@
 #include <utility>
 #include <variant>
 
-#include "media/types.h"
+#include "media/base/types.h"
 
 namespace nullmark {
 

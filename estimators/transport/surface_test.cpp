@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "estimators/rng.h"
 #include "estimators/transport/phase.h"
+#include "estimators/walk/rng.h"
 
 namespace nullmark {
 namespace {

@@ -7,21 +7,21 @@
 #include <filesystem>
 #include <set>
 
-#include "harness/cell_names.h"
-#include "harness/comparison.h"
-#include "harness/expectation.h"
-#include "harness/findings_text.h"
-#include "harness/metrics.h"
-#include "harness/names.h"
-#include "harness/provenance.h"
-#include "harness/remarks.h"
+#include "harness/analysis/check.h"
+#include "harness/analysis/comparison.h"
+#include "harness/analysis/expectation.h"
+#include "harness/analysis/scaling.h"
+#include "harness/config/cell_names.h"
+#include "harness/io/results_json.h"
+#include "harness/io/spec_json.h"
+#include "harness/io/transport_json.h"
+#include "harness/model/metrics.h"
+#include "harness/model/names.h"
+#include "harness/report/claims_text.h"
 #include "harness/report/images.h"
-#include "harness/results_json.h"
-#include "harness/scaling.h"
-#include "harness/spec_json.h"
-#include "harness/summary.h"
-#include "harness/transport_json.h"
-#include "harness/words.h"
+#include "harness/report/warnings.h"
+#include "harness/run/provenance.h"
+#include "harness/verdict/cell_word.h"
 
 namespace nullmark {
 namespace {

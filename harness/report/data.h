@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/json_input.h"
-#include "harness/record.h"
+#include "harness/io/json_input.h"
+#include "harness/model/record.h"
 
 namespace nullmark {
 

@@ -12,8 +12,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "harness/file_io.h"
-#include "harness/json_input.h"
+#include "harness/io/file_io.h"
+#include "harness/io/json_input.h"
 
 namespace nullmark {
 namespace {

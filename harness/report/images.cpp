@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "harness/image.h"
+#include "harness/run/image.h"
 
 namespace nullmark {
 namespace {

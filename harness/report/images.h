@@ -3,16 +3,16 @@
 #include <map>
 #include <string>
 
-#include "harness/json_input.h"
-#include "harness/record.h"
+#include "harness/io/json_input.h"
+#include "harness/model/record.h"
 
 namespace nullmark {
 
 /// The pictures of a report, each once, as 16-bit numbers in base64 (harness/report/report.md).
 class ReportImages {
  public:
-  /// The pictures of a cell, by kind ("mean", "reference", "variance", "variance_theory", "lookups", "null_collisions"), as places
-  /// in json(); null where it has none or they are not beside the results file.  Channels are averaged.
+  /// The pictures of a cell, by kind ("mean", "reference", "variance", "variance_theory", "lookups", "null_collisions"), as
+  /// places in json(); null where it has none or they are not beside the results file.  Channels are averaged.
   Json add(const CellRecord& record, const std::string& results_file);
 
   const Json& json() const { return images_; }

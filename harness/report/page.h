@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "harness/json_input.h"
+#include "harness/io/json_input.h"
 
 namespace nullmark {
 

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <filesystem>
 
-#include "harness/image.h"
-#include "harness/program_test.h"
-#include "harness/record_examples.h"
 #include "harness/report/data.h"
 #include "harness/report/page.h"
+#include "harness/run/image.h"
+#include "harness/testing/program.h"
+#include "harness/testing/record_examples.h"
 
 namespace nullmark {
 namespace {

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "media/medium.h"
+#include "media/base/medium.h"
 
 namespace nullmark {
 

@@ -2,8 +2,8 @@
 
 #include <string>
 
+#include "media/base/parameters.h"
 #include "media/majorants/majorant.h"
-#include "media/parameters.h"
 
 namespace nullmark {
 

@@ -5,7 +5,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "media/medium.h"
+#include "media/base/medium.h"
 
 namespace nullmark {
 

@@ -1,8 +1,8 @@
 #include <array>
 
-#include "harness/bench.h"
-#include "harness/scene.h"
-#include "media/example_media.h"
+#include "harness/sampling/scene.h"
+#include "harness/testing/bench.h"
+#include "harness/testing/example_media.h"
 
 namespace nullmark {
 namespace {

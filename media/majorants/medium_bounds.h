@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "media/medium.h"
-#include "media/parameters.h"
+#include "media/base/medium.h"
+#include "media/base/parameters.h"
 
 namespace nullmark {
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "media/field.h"
+#include "media/base/field.h"
 
 namespace nullmark {
 namespace {

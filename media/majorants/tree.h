@@ -2,8 +2,8 @@
 
 #include <memory>
 
+#include "media/base/registry.h"
 #include "media/majorants/bound_lattice.h"
-#include "media/registry.h"
 
 namespace nullmark {
 

@@ -8,8 +8,8 @@
 #include <functional>
 #include <random>
 
-#include "media/built_media.h"
-#include "media/channels.h"
+#include "harness/testing/built_media.h"
+#include "media/base/channels.h"
 #include "media/checkerboard.h"
 #include "media/exponential_cube.h"
 #include "media/fractal_noise.h"

@@ -1,0 +1,163 @@
+#pragma once
+
+#include "estimators/walk/flight.h"
+#include "estimators/walk/lane_rng.h"
+
+namespace nullmark {
+
+/// The rates that all walks of a ray fly through, rounded to T.
+template <class T, std::size_t N>
+class LaneCourse {
+ public:
+  using Pack = Lanes<T, N>;
+  using Index = LaneIndex<T, N>;
+
+  LaneCourse() = default;
+  explicit LaneCourse(const Rates& rates)
+      : pieces_(rates.size() > 0 ? rates.pieces<T>() : &kVacuum),
+        last_(rates.size() > 0 ? static_cast<Number>(rates.size()) - 1 : 0),
+        begin_(static_cast<T>(rates.begin())),
+        end_(static_cast<T>(rates.end())),
+        total_(static_cast<T>(rates.total_depth())),
+        rewinds_(last_ > 0 && rates.crossing() == Crossing::rewind) {}
+
+  bool has_several() const { return last_ > 0; }
+  template <bool several>
+  Pack rate(Index piece) const {
+    return of<several, &RatePiece<T>::rate>(piece);
+  }
+
+ private:
+  template <class, std::size_t, bool>
+  friend class LaneFlight;
+  using Number = typename Index::Number;
+  static constexpr RatePiece<T> kVacuum{};
+
+  template <bool several, auto member>
+  [[gnu::always_inline]] Pack of(Index piece) const {
+    static_assert(sizeof(RatePiece<T>) == 6 * sizeof(T));
+    return !several || last_ == 0 ? Pack(pieces_->*member) : piece.template gathered<6>(&(pieces_->*member));
+  }
+
+  const RatePiece<T>* pieces_ = &kVacuum;
+  Number last_ = 0;
+  T begin_ = 0, end_ = 0, total_ = 0;
+  bool rewinds_ = false;
+};
+
+/// Where N walks are.
+template <class T, std::size_t N>
+struct LanePlace {
+  Lanes<T, N> depth, position;
+  LaneIndex<T, N> piece;
+};
+
+/// Flight for N walks of one ray side by side: the same steps in the same order for every lane.  Without `several` the course has
+/// one piece, as with one bound for the whole ray, and nothing is asked about others; an estimator that sets out on another
+/// course than the ray's does so in its init, which runs with `several`.
+template <class T, std::size_t N, bool several = true>
+class LaneFlight {
+ public:
+  using Pack = Lanes<T, N>;
+  using Mask = LaneMask<T, N>;
+  using Index = LaneIndex<T, N>;
+  using Streams = LaneRng<T, N>;
+  using Course = LaneCourse<T, N>;
+  using Place = LanePlace<T, N>;
+
+  LaneFlight(Course& course, Place& at) : course_(course), at_(at) {}
+
+  void start(const Rates& rates) requires several {
+    course_ = Course(rates);
+    at_ = {Pack(0), Pack(course_.begin_), Index(0)};
+  }
+
+  [[gnu::always_inline]] Mask next(Streams& rng) { return next(rng, true); }
+
+  /// Lanes whose walk is no longer alive leave with this step.
+  [[gnu::always_inline]] Mask next(Streams& rng, Mask alive) {
+    const Pack depth = rng.exponential_beyond(at_.depth);
+    rng.forget(!alive);
+    if (several && course_.rewinds_) {
+      // By value: what a call could reach would not stay in registers.
+      const Rewound rewound = rewind(course_, at_, depth, rng.state(), rng.alive(), alive);
+      at_ = rewound.at;
+      rng.go_on(rewound.stream, rewound.draws);
+      return rewound.inside;
+    }
+    return advance_to(depth, alive);
+  }
+
+  /// Moves forwards to points of the given depths; false (and the ray's end) for lanes whose ray is not that deep.
+  [[gnu::always_inline]] Mask advance_to(Pack depth, Mask alive = true) {
+    const Mask inside = alive & (depth < Pack(course_.total_));
+    at_.depth = depth;
+    if (several && course_.last_ > 0) {
+      for (;;) {
+        const Mask behind = inside & !(depth < course_.template of<several, &RatePiece<T>::depth_after>(at_.piece));
+        if (none(behind)) break;
+        at_.piece = select(behind, at_.piece + Index(1), at_.piece);
+      }
+    }
+    at_.position = select(inside, position(course_, at_), Pack(course_.end_));
+    return inside;
+  }
+
+  void jump(Pack position) { at_.position = position; }
+
+  Pack position() const { return at_.position; }
+  Index piece() const { return at_.piece; }
+  Pack rate() const { return course_.template rate<several>(at_.piece); }
+  Pack depth() const { return at_.depth; }
+  Pack depth_left() const { return Pack(course_.total_) - at_.depth; }
+  Pack total_depth() const { return course_.total_; }
+
+ private:
+  struct Rewound {
+    Place at;
+    typename Streams::State stream;
+    std::uint64_t draws;
+    Mask inside;
+  };
+
+  [[gnu::always_inline]] static Pack position(const Course& course, const Place& at) {
+    using Piece = RatePiece<T>;
+    const Pack begin = course.template of<several, &Piece::begin>(at.piece);
+    const Pack end = course.template of<several, &Piece::end>(at.piece);
+    Pack within = at.depth;
+    if constexpr (several) within = within - course.template of<several, &Piece::depth_before>(at.piece);
+    return smaller(end, begin + within * course.template of<several, &Piece::inverse_rate>(at.piece));
+  }
+
+  /// See Flight::rewind.
+  [[gnu::noinline]] static Rewound rewind(const Course& course, Place at, Pack depth, typename Streams::State stream, Mask living,
+                                          Mask flying) {
+    Streams rng(stream, living);
+    const Index last(course.last_);
+    Mask inside = false;
+    for (;;) {
+      Pack after = course.template of<several, &RatePiece<T>::depth_after>(at.piece);
+      for (;;) {
+        const Mask behind = flying & !(at.depth < after) & (at.piece < last);
+        if (none(behind)) break;
+        at.piece = select(behind, at.piece + Index(1), at.piece);
+        after = course.template of<several, &RatePiece<T>::depth_after>(at.piece);
+      }
+      flying = flying & (at.depth < after);
+      const Mask lands = flying & (depth < after);
+      at.depth = select(lands, depth, select(flying, after, at.depth));
+      inside = inside | lands;
+      flying = flying & !lands & (at.depth < Pack(course.total_));
+      if (none(flying)) break;
+      const Pack drawn = rng.exponential(flying);
+      depth = select(flying, at.depth + drawn, depth);
+    }
+    at.position = select(inside, position(course, at), Pack(course.end_));
+    return {at, stream, rng.draws(), inside};
+  }
+
+  Course& course_;
+  Place& at_;
+};
+
+}  // namespace nullmark

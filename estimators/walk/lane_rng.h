@@ -1,0 +1,151 @@
+#pragma once
+
+#include <array>
+
+#include "estimators/walk/rng.h"
+#include "media/base/lanes.h"
+
+namespace nullmark {
+
+/// N streams side by side: in double each is the Rng of its sample address, bit for bit; in float xoshiro128++ [Blackman and
+/// Vigna 2021] with the same Philox block as its state.
+template <class T, std::size_t N>
+class LaneRng {
+  static constexpr bool kDouble = std::is_same_v<T, double>;
+  using Word = std::conditional_t<kDouble, std::uint64_t, std::uint32_t>;
+  using Tag = hn::FixedTag<Word, N>;
+  using Vector = hn::Vec<Tag>;
+  static constexpr std::size_t kWords = kDouble ? 2 : 4;
+
+ public:
+  using Pack = Lanes<T, N>;
+  using Mask = LaneMask<T, N>;
+  using State = std::array<Vector, kWords>;
+
+  /// State of the streams of N consecutive samples.
+  static State seeded(const SampleAddress& first);
+
+  /// Goes on from the state and leaves it where it has come to; draws count for the lanes that are alive.
+  LaneRng(State& state, Mask alive) : state_(state), alive_(alive), living_(count(alive)) {}
+
+  /// Multiples of 2^-53 (2^-24 in float) in [0, 1).
+  [[gnu::always_inline]] Pack uniform() {
+    draws_ += living_;
+    return fraction();
+  }
+
+  /// Unit exponentials -log(1 - u): at most 36.7 (16.6 in float).
+  [[gnu::always_inline]] Pack exponential() {
+    draws_ += living_;
+    return negative_logarithm(Pack(1) - fraction());
+  }
+
+  /// x + exponential(), without turning the logarithm's sign on the way.
+  [[gnu::always_inline]] Pack exponential_beyond(Pack x) {
+    draws_ += living_;
+    return x - logarithm(Pack(1) - fraction());
+  }
+
+  /// exponential() where only the lanes of the mask draw; the others' streams stay where they were.
+  Pack exponential(Mask lanes) {
+    const State before = state_;
+    draws_ += count(lanes & alive_);
+    const Pack e = negative_logarithm(Pack(1) - fraction());
+    for (std::size_t w = 0; w < kWords; ++w)
+      state_[w] = hn::IfThenElse(hn::RebindMask(Tag(), lanes.mask()), state_[w], before[w]);
+    return e;
+  }
+
+  /// Takes back the count of a draw by lanes whose walk had ended: they leave with it.
+  void forget(Mask lanes) { draws_ -= count(lanes & alive_); }
+
+  std::uint64_t draws() const { return draws_; }
+
+  const State& state() const { return state_; }
+  Mask alive() const { return alive_; }
+  /// After `draws` draws made elsewhere from this state on.
+  void go_on(const State& state, std::uint64_t draws) {
+    state_ = state;
+    draws_ += draws;
+  }
+
+ private:
+  /// The next u; 1 - u is exact as well.
+  [[gnu::always_inline]] Pack fraction() {
+    using namespace hn;
+    const auto rotated = []<int k>(Vector v, std::integral_constant<int, k>) {
+      return RotateRight<static_cast<int>(sizeof(Word)) * 8 - k>(v);
+    };
+    const RebindToSigned<Tag> integers;
+    const FixedTag<T, N> reals;
+    if constexpr (kDouble) {
+      const Vector a = state_[0], b = Xor(state_[1], a);
+      const Vector output = Add(rotated(Add(a, state_[1]), std::integral_constant<int, 17>()), a);
+      state_[0] = Xor(Xor(rotated(a, std::integral_constant<int, 49>()), b), ShiftLeft<21>(b));
+      state_[1] = rotated(b, std::integral_constant<int, 28>());
+      return Pack(ConvertTo(reals, BitCast(integers, ShiftRight<11>(output)))) * Pack(0x1p-53);
+    } else {
+      const Vector output = Add(rotated(Add(state_[0], state_[3]), std::integral_constant<int, 7>()), state_[0]);
+      const Vector t = ShiftLeft<9>(state_[1]);
+      state_[2] = Xor(state_[2], state_[0]);
+      state_[3] = Xor(state_[3], state_[1]);
+      state_[1] = Xor(state_[1], state_[2]);
+      state_[0] = Xor(state_[0], state_[3]);
+      state_[2] = Xor(state_[2], t);
+      state_[3] = rotated(state_[3], std::integral_constant<int, 11>());
+      return Pack(ConvertTo(reals, BitCast(integers, ShiftRight<8>(output)))) * Pack(0x1p-24);
+    }
+  }
+
+  State& state_;
+  std::uint64_t draws_ = 0;
+  Mask alive_;
+  std::size_t living_;
+};
+
+template <class T, std::size_t N>
+typename LaneRng<T, N>::State LaneRng<T, N>::seeded(const SampleAddress& first) {
+  using namespace hn;
+  // Philox4x32-10 (media/base/philox.h), each of its words in the low half of a 64-bit lane: one half of the samples after the
+  // other.
+  constexpr std::size_t kWide = N < kNativeLanes<double> ? N : kNativeLanes<double>;
+  const FixedTag<std::uint64_t, kWide> wide;
+  alignas(HWY_MAX_BYTES) std::array<std::array<Word, N>, kWords> words;
+  for (std::size_t done = 0; done < N; done += kWide) {
+    const auto sample = Add(Iota(wide, 0), Set(wide, first.sample + done));
+    const auto low = Set(wide, 0xffffffff);
+    auto c0 = And(sample, low), c1 = ShiftRight<32>(sample), c2 = Set(wide, first.ray), c3 = Zero(wide);
+    std::uint32_t k0 = static_cast<std::uint32_t>(first.key), k1 = static_cast<std::uint32_t>(first.key >> 32);
+    const RepartitionToNarrow<decltype(wide)> narrow;
+    for (int round = 0; round < 10; ++round, k0 += 0x9E3779B9, k1 += 0xBB67AE85) {
+      const auto a = MulEven(BitCast(narrow, c0), Set(narrow, 0xD2511F53)),
+                 b = MulEven(BitCast(narrow, c2), Set(narrow, 0xCD9E8D57));
+      c0 = Xor(Xor(ShiftRight<32>(b), c1), Set(wide, k0));
+      c1 = And(b, low);
+      c2 = Xor(Xor(ShiftRight<32>(a), c3), Set(wide, k1));
+      c3 = And(a, low);
+    }
+    std::uint64_t c[4][kWide];
+    StoreU(c0, wide, c[0]);
+    StoreU(c1, wide, c[1]);
+    StoreU(c2, wide, c[2]);
+    StoreU(c3, wide, c[3]);
+    for (std::size_t k = 0; k < kWide; ++k) {
+      if constexpr (kDouble) {
+        words[0][done + k] = c[0][k] | c[1][k] << 32;
+        words[1][done + k] = c[2][k] | c[3][k] << 32;
+      } else {
+        for (std::size_t w = 0; w < 4; ++w) words[w][done + k] = static_cast<std::uint32_t>(c[w][k]);
+      }
+    }
+  }
+  State state;
+  auto any = Zero(Tag());
+  for (std::size_t w = 0; w < kWords; ++w) any = Or(any, state[w] = Load(Tag(), words[w].data()));
+  // The one state that the generator cannot leave.
+  const std::size_t last = kDouble ? 1 : 3;
+  state[last] = IfThenElse(Eq(any, Zero(Tag())), Set(Tag(), 1), state[last]);
+  return state;
+}
+
+}  // namespace nullmark

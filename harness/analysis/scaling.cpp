@@ -1,0 +1,132 @@
+#include "harness/analysis/scaling.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <functional>
+
+#include "harness/config/cell_names.h"
+#include "harness/io/transport_json.h"
+#include "harness/model/names.h"
+#include "harness/registry/components.h"
+
+namespace nullmark {
+namespace {
+
+void add_numbers(const std::string& prefix, const Component& component, std::map<std::string, Real>& numbers) {
+  for (const auto& [name, value] : component.values) {
+    if (const Real* real = std::get_if<Real>(&value)) numbers[prefix + name] = *real;
+    if (const int* whole = std::get_if<int>(&value)) numbers[prefix + name] = *whole;
+  }
+}
+
+/// All that a cell is but one of its parameters.
+std::string without(const CellRecord& record, const std::map<std::string, Real>& numbers, const std::string& axis) {
+  std::string key =
+      fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}", record.cell.experiment, record.cell.estimator.type, record.medium.field.type,
+                  record.majorant.type, record.ray_set.type, to_string(record.cell.quantity), to_string(record.cell.precision),
+                  record.cell.seed, transport_label(record.cell.transport));
+  // Text and lists stand in the labels alone; numbers do as well, but would tell the points of a series apart.
+  for (const auto* component : {&record.cell.estimator, &record.medium.field, &record.majorant, &record.ray_set})
+    for (const auto& [name, value] : component->values)
+      if (!std::holds_alternative<Real>(value) && !std::holds_alternative<int>(value)) key += "|" + name + ":" + to_text(value);
+  for (const MediumSpec& channel : record.medium.per_channel) key += "|" + channel.label;
+  if (axis != "channels")
+    for (const Real factor : record.medium.spectrum) key += fmt::format("|{}", factor);
+  for (const auto& [name, number] : numbers)
+    if (name != axis) key += fmt::format("|{}:{}", name, number);
+  return key;
+}
+
+std::optional<Interval> exponent(const ScalingSeries& series, std::size_t from,
+                                 const std::function<std::optional<Real>(const CellRecord&)>& value) {
+  std::vector<std::pair<Real, Real>> points;
+  for (std::size_t i = from; i < series.cells.size(); ++i)
+    if (const std::optional<Real> y = value(*series.cells[i]); y && *y > 0) points.emplace_back(series.x[i], *y);
+  return power_law(points);
+}
+
+}  // namespace
+
+std::map<std::string, Real> numeric_parameters(const CellRecord& record) {
+  std::map<std::string, Real> numbers{{"channels", record.channels}};
+  add_numbers("estimator.", record.cell.estimator, numbers);
+  add_numbers("medium.", record.medium.field, numbers);
+  add_numbers("majorant.", record.majorant, numbers);
+  add_numbers("rays.", record.ray_set, numbers);
+  return numbers;
+}
+
+std::optional<Interval> power_law(const std::vector<std::pair<Real, Real>>& points) {
+  const std::size_t n = points.size();
+  if (n < 3) return std::nullopt;
+  Real x_mean = 0, y_mean = 0;
+  for (const auto& [x, y] : points) {
+    x_mean += std::log(x) / static_cast<Real>(n);
+    y_mean += std::log(y) / static_cast<Real>(n);
+  }
+  Real xx = 0, xy = 0;
+  for (const auto& [x, y] : points) {
+    xx += (std::log(x) - x_mean) * (std::log(x) - x_mean);
+    xy += (std::log(x) - x_mean) * (std::log(y) - y_mean);
+  }
+  if (!(xx > 0)) return std::nullopt;
+  const Real slope = xy / xx;
+  Real squares = 0;
+  for (const auto& [x, y] : points) {
+    const Real residual = std::log(y) - y_mean - slope * (std::log(x) - x_mean);
+    squares += residual * residual;
+  }
+  const auto freedom = static_cast<Real>(n - 2);
+  const Real half = boost::math::quantile(boost::math::students_t(freedom), 0.975) * std::sqrt(squares / freedom / xx);
+  return Interval{slope, slope - half, slope + half};
+}
+
+std::vector<ScalingSeries> scaling_series(const RunRecord& run) {
+  std::vector<ScalingSeries> all;
+  std::map<std::string, std::vector<std::pair<Real, const CellRecord*>>> families;
+  std::map<std::string, std::string> axes;
+  for (const CellRecord& record : run.cells) {
+    if (record.status != Status::ok || !record.outputs.empty()) continue;
+    const std::map<std::string, Real> numbers = numeric_parameters(record);
+    for (const auto& [axis, x] : numbers) {
+      if (!(x > 0) || !std::isfinite(x)) continue;
+      const std::string key = axis + "|" + without(record, numbers, axis);
+      families[key].emplace_back(x, &record);
+      axes[key] = axis;
+    }
+  }
+  for (auto& [key, members] : families) {
+    if (members.size() < 3) continue;
+    std::sort(members.begin(), members.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    const auto same_x = [](const auto& a, const auto& b) { return a.first == b.first; };
+    if (std::adjacent_find(members.begin(), members.end(), same_x) != members.end()) continue;
+    ScalingSeries series;
+    series.axis = axes[key];
+    for (const auto& [x, record] : members) {
+      series.x.push_back(x);
+      series.cells.push_back(record);
+    }
+    const CellRecord& first = *series.cells.front();
+    series.tracker = series.axis.rfind("estimator.", 0) == 0 ? first.cell.estimator.type : tracker_label(first.cell);
+    const auto label = [&](const char* prefix, const std::string& whole, const std::string& type) {
+      return series.axis.rfind(prefix, 0) == 0 || (series.axis == "channels" && std::string(prefix) == "medium.") ? type : whole;
+    };
+    series.rest = fmt::format("{} | {} | {} | {} | {}", first.cell.experiment, to_string(first.cell.quantity),
+                              label("medium.", first.medium.label, first.medium.field.type),
+                              label("majorant.", first.majorant.label, first.majorant.type),
+                              label("rays.", first.ray_set.label, first.ray_set.type));
+    const auto time = [](const CellRecord& record) {
+      return record.time ? std::optional(record.time->ns_per_sample) : std::nullopt;
+    };
+    series.time = exponent(series, 0, time);
+    series.time_upper = exponent(series, series.cells.size() / 2, time);
+    series.lookups = exponent(series, 0, [](const CellRecord& record) { return record.lookups_per_sample; });
+    all.push_back(std::move(series));
+  }
+  return all;
+}
+
+}  // namespace nullmark

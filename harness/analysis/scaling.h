@@ -1,0 +1,34 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/model/record.h"
+#include "harness/statistics/interval.h"
+
+namespace nullmark {
+
+/// The numeric parameters of a cell's estimator, medium, majorant and rays ("medium.optical_depth"), and "channels".
+std::map<std::string, Real> numeric_parameters(const CellRecord& record);
+
+/// Exponent p of y ~ x^p by least squares of logarithms, with the 95 % interval that the scatter around the line gives.  Nothing
+/// for fewer than three points or two different x; x and y must be above 0.
+std::optional<Interval> power_law(const std::vector<std::pair<Real, Real>>& points);
+
+/// Cells that differ in one parameter alone.
+struct ScalingSeries {
+  std::string axis;                       ///< the parameter
+  std::string tracker, rest;              ///< the tracker, and all that is the same
+  std::vector<const CellRecord*> cells;   ///< by ascending parameter, three or more
+  std::vector<Real> x;                    ///< the parameter, > 0
+  std::optional<Interval> time, lookups;  ///< exponents of ns per sample and of lookups per sample
+  std::optional<Interval> time_upper;     ///< the same over the upper half of the points, where three are there
+};
+
+/// All such series of a run's sampled cells.
+std::vector<ScalingSeries> scaling_series(const RunRecord& run);
+
+}  // namespace nullmark

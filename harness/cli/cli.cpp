@@ -1,0 +1,358 @@
+#include "harness/cli/cli.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+
+#include "harness/analysis/hard_case_table.h"
+#include "harness/cli/commands.h"
+#include "harness/config/schema.h"
+#include "harness/io/file_io.h"
+#include "harness/io/json_input.h"
+#include "harness/io/outputs.h"
+#include "harness/io/results_json.h"
+#include "harness/registry/estimator_entry.h"
+#include "harness/report/check_text.h"
+#include "harness/report/comparison_text.h"
+#include "harness/report/export.h"
+#include "harness/report/junit.h"
+#include "harness/report/warnings.h"
+#include "harness/run/merge.h"
+#include "harness/run/provenance.h"
+#include "media/base/registry.h"
+#include "media/volumes/vdb_writer.h"
+
+namespace nullmark {
+namespace {
+
+/// Messages quote what users wrote, line breaks included.
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+/// Text to a file, or to standard output for "" and "-".
+void deliver(const std::string& text, const std::string& output) {
+  if (output.empty() || output == "-")
+    fmt::print("{}", text);
+  else
+    write_atomically(output, text);
+}
+
+ExitCode report(ExitCode code, const std::string& message) {
+  fmt::print(stderr, "nullmark: {}\n", one_line(message));
+  return code;
+}
+
+std::vector<RunRecord> load_all(const std::vector<std::string>& files) {
+  std::vector<RunRecord> runs;
+  runs.reserve(files.size());
+  for (const std::string& file : files) runs.push_back(read_results(read_file(file), file));
+  return runs;
+}
+
+void warn(const std::string& file, const std::optional<std::string>& remark) {
+  if (remark) fmt::print(stderr, "nullmark: warning: {}: {}\n", file, one_line(*remark));
+}
+
+/// Throws InputError where the word is none of the names.
+void expect_one_of(const std::string& word, const std::vector<std::string>& names, const char* what) {
+  if (std::find(names.begin(), names.end(), word) != names.end()) return;
+  const std::string near = nearest(word, names);
+  throw InputError(fmt::format(
+      "unknown {} \"{}\"; {}", what, word,
+      near.empty() ? fmt::format("expected one of {}", fmt::join(names, ", ")) : fmt::format("did you mean \"{}\"?", near)));
+}
+
+/// The commands of the program, what they take, and what the user asked of them.
+class CommandLine {
+ public:
+  CommandLine(int argc, char** argv) {
+    run_.command_line.assign(argv, argv + argc);
+    app_.set_version_flag("--version", version_line());
+    app_.require_subcommand(1);
+    app_.failure_message(CLI::FailureMessage::simple);
+    add_run();
+    add_replay();
+    add_check();
+    add_compare();
+    add_gate();
+    add_report();
+    add_list();
+    add_schema();
+    add_export();
+    add_merge();
+    add_make_volume();
+  }
+
+  ExitCode execute() {
+    const std::vector<std::string>& words = run_.command_line;
+    if (words.size() <= 1) {
+      fmt::print("{}", app_.help());
+      return ExitCode::ok;
+    }
+    refuse_unknown_command(words[1]);
+    refuse_unknown_option(words);
+    std::vector<std::string> reversed(words.rbegin(), words.rend() - 1);
+    try {
+      app_.parse(reversed);
+    } catch (const CLI::ParseError& error) {
+      // Help and version end the parse by throwing as well.
+      if (error.get_exit_code() == 0) return static_cast<ExitCode>(app_.exit(error));
+      throw InputError(one_line(error.what()));
+    }
+    return action_();
+  }
+
+ private:
+  void refuse_unknown_command(const std::string& word) const {
+    std::vector<std::string> names;
+    for (const CLI::App* command : app_.get_subcommands({})) names.push_back(command->get_name());
+    if (word.rfind('-', 0) != 0) expect_one_of(word, names, "command");
+  }
+
+  /// CLI11 refuses it as well, but does not tell the nearest.
+  void refuse_unknown_option(const std::vector<std::string>& words) const {
+    if (words[1].rfind('-', 0) == 0) return;
+    std::vector<std::string> names;
+    for (const CLI::Option* option : app_.get_subcommand(words[1])->get_options())
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (std::size_t i = 2; i < words.size() && words[i] != "--"; ++i)
+      if (words[i].rfind("--", 0) == 0) expect_one_of(words[i].substr(0, words[i].find('=')), names, "option");
+  }
+
+  template <class Action>
+  CLI::App* add(const char* name, const char* text, Action action) {
+    CLI::App* command = app_.add_subcommand(name, text);
+    command->final_callback([this, action] { action_ = action; });
+    return command;
+  }
+
+  void add_run() {
+    CLI::App* command = add("run", "Run configurations and write their results", [this] { return run_command(run_); });
+    command->add_option("CONFIG", run_.configs, "Configuration files, folders of them, or - for standard input")->required();
+    command->add_option("-o,--output", run_.output,
+                        "Results file (default: CONFIG's stem + .results.json); - for standard output");
+    command->add_option("--threads", run_.threads, "Threads; 0: all cores.  Results do not depend on it")
+        ->check(CLI::Range(0, 4096));
+    command->add_option("--seed", run_.seed, "Seed in place of the configuration's, or \"random\"");
+    command->add_option("--filter", run_.filter, "Only cells whose name matches this regular expression");
+    command->add_flag("--covering", run_.covering, "Only a part that meets every pair of estimator, medium, depth and majorant");
+    command->add_option("--shard", run_.shard, "Only part K of N: K/N");
+    command->add_flag("--resume", run_.resume, "Go on from the results and the journal that are there");
+    command->add_flag("--force", run_.force, "Replace results that are there")->excludes("--resume");
+    command->add_flag("--dry-run", run_.dry_run, "Print cells, predicted samples, lookups and time; sample nothing");
+    command->add_option("--time-budget", run_.time_budget, "Seconds after which no further cell is started")
+        ->check(CLI::Validator(
+            [](const std::string& text) {
+              double seconds = -1;
+              const bool number = CLI::detail::lexical_cast(text, seconds) && std::isfinite(seconds) && seconds >= 0;
+              return number ? std::string() : fmt::format("found \"{}\"; expected seconds >= 0", text);
+            },
+            "SECONDS"));
+    command->add_flag("--no-timing", run_.no_timing, "Statistics only");
+  }
+
+  void add_replay() {
+    CLI::App* command = add("replay", "Draw one sample of a cell again: every random number, lookup and weight",
+                            [this] { return replay_command(replay_); });
+    command->add_option("RESULTS", replay_.results, "Results file")->required();
+    command->add_option("CELL", replay_.cell, "Name of a cell in it")->required();
+    CLI::Option* ray =
+        command->add_option("--ray", replay_.ray, "Ray, from 0 (default: of the sample farthest from its ray's target)");
+    command->add_option("--sample", replay_.sample, "Sample of the ray, from 0 (default: the one farthest from its target)")
+        ->needs(ray);
+    command->add_flag("--json", replay_.json, "As JSON, with all digits");
+  }
+
+  void add_check() {
+    CLI::App* command = add("check", "Verdicts on bias and expected lookups, derived from the results file alone", [this] {
+      refuse_overwriting({file_}, {junit_, markdown_});
+      RunRecord run = load_all({file_})[0];
+      const Summary summary = summarise(run, strict_);
+      if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
+      warn(file_, version_remark(run));
+      warn(file_, busy_remark(run));
+      if (!markdown_.empty())
+        write_atomically(markdown_, fmt::format("{}{}{}", summary_markdown(run, summary, file_), cases_ ? "\n" : "",
+                                                cases_ ? stability_markdown(run) : ""));
+      if (cases_) fmt::print("{}\n", stability_text(run));
+      fmt::print("{}", summary_text(run, summary));
+      return summary.exit;
+    });
+    command->add_option("RESULTS", file_, "Results file")->required();
+    command->add_flag(
+        "--cases", cases_,
+        "Also show per experiment and tracker what was finite, the largest sample, the worst error, the guards that fired");
+    command->add_flag("--strict", strict_, "Exit code 77 where any cell that claims something is not decided");
+    command->add_option("--junit", junit_, "Also write a JUnit report");
+    command->add_option("--markdown", markdown_, "Also write a summary for a pull request");
+  }
+
+  void add_compare() {
+    CLI::App* command = add("compare", "Rank estimators by what accuracy costs in time", [this] {
+      refuse_overwriting(files_, {markdown_});
+      const std::vector<RunRecord> runs = load_all(files_);
+      const std::string ranking = compare_text(runs, baseline_, paired_);
+      if (ranking.empty()) return report(ExitCode::nothing_ran, "no cell of these results was sampled; nothing to compare");
+      for (std::size_t i = 0; i < runs.size(); ++i) {
+        warn(files_[i], version_remark(runs[i]));
+        warn(files_[i], busy_remark(runs[i]));
+      }
+      fmt::print("{}", ranking);
+      if (!markdown_.empty()) write_atomically(markdown_, compare_markdown(runs, baseline_, paired_));
+      return ExitCode::ok;
+    });
+    command->add_option("RESULTS", files_, "Results files")->required();
+    command->add_option("--baseline", baseline_, "Estimator to compare the others with");
+    command->add_flag("--paired", paired_, "Also compare mean squared errors on common random streams");
+    command->add_option("--markdown", markdown_, "Also write the tables for a pull request");
+  }
+
+  void add_gate() {
+    CLI::App* command = add("gate", "Compare what cells cost with a baseline; exit code 4 where a regression is proven",
+                            [this] { return gate_command(gate_); });
+    command->add_option("--baseline", gate_.baseline, "Results, a baseline, or a folder of baselines")->required();
+    command->add_option("RESULTS", gate_.results, "Results file")->required();
+    command
+        ->add_option("--threshold", gate_.threshold,
+                     "Percent that a change must exceed, in place of the tiers' own: 0, 1, .2 to 1 (by history), 5")
+        ->check(CLI::Range(0., 1000.));
+    CLI::Option* blocks = command->add_option("--blocks", gate_.blocks, "Folder of scripts/compare-builds: wall time as well");
+    command->add_flag("--quiet-machine", gate_.quiet_machine, "Slower wall time is a regression, not only a remark")
+        ->needs(blocks);
+    command->add_flag("--update", gate_.update, "Make the results the baseline")->excludes(blocks);
+    command->add_option("--junit", gate_.junit, "Also write a JUnit report");
+    command->add_option("--markdown", gate_.markdown, "Also write a summary for a pull request");
+  }
+
+  void add_report() {
+    CLI::App* command =
+        add("report", "Write one self-contained page with tables and plots", [this] { return report_command(report_); });
+    command->add_option("RESULTS", report_.results, "Results files")->required();
+    command->add_option("-o,--output", report_.output, "HTML file to write; one that is there is replaced")->required();
+    command->add_option("--baseline", report_.baseline, "Estimator to compare the others with");
+    command->add_option("--figures", report_.figures, "Folder for the main plots as PNG and SVG; needs Chromium");
+    command->add_option("--markdown", report_.markdown, "Also write the rankings for a pull request");
+  }
+
+  void add_list() {
+    CLI::App* command = add("list", "List what configurations may name, with parameters and sources", [this] {
+      const std::vector<std::string> lists = {"estimators", "media", "majorants", "rays", "quantities"};
+      if (list_.what.empty()) throw InputError(fmt::format("list what? expected one of {}", fmt::join(lists, ", ")));
+      expect_one_of(list_.what, lists, "list");
+      return list_command(list_);
+    });
+    command->add_option("WHAT", list_.what, "estimators, media, majorants, rays or quantities");
+    command->add_flag("--json", list_.json, "As JSON");
+  }
+
+  void add_schema() {
+    CLI::App* command = add("schema", "Print a JSON Schema (draft-07)", [this] {
+      expect_one_of(schema_, {"config", "results"}, "schema");
+      fmt::print("{}\n", (schema_ == "config" ? config_schema() : results_schema()).dump(2));
+      return ExitCode::ok;
+    });
+    command->add_option("WHICH", schema_, "config or results")->required();
+  }
+
+  void add_export() {
+    CLI::App* command = add("export", "Write results in another program's format", [this] {
+      expect_one_of(format_, export_formats(), "format");
+      refuse_overwriting({file_}, {output_});
+      RunRecord run = load_all({file_})[0];
+      summarise(run);
+      deliver(export_results(run, format_, file_), output_);
+      return ExitCode::ok;
+    });
+    command->add_option("RESULTS", file_, "Results file")->required();
+    command->add_option("--format", format_, "google-benchmark, csv, jsonl or junit")->required();
+    command->add_option("-o,--output", output_, "File; default standard output");
+  }
+
+  void add_merge() {
+    CLI::App* command = add("merge", "Join the results of shards", [this] {
+      refuse_overwriting(files_, {output_});
+      if (!force_ && output_ != "-" && std::filesystem::exists(output_))
+        throw InputError(output_ + ": exists; --force replaces it");
+      deliver(results_text(merge_results(load_all(files_), files_)), output_);
+      return ExitCode::ok;
+    });
+    command->add_option("PART", files_, "Results files of one configuration")->required();
+    command->add_option("-o,--output", output_, "Results file; - for standard output")->required();
+    command->add_flag("--force", force_, "Replace results that are there");
+  }
+
+  void add_make_volume() {
+    CLI::App* command = add("make-volume", "Write a procedural smoke volume (OpenVDB, grid \"density\")", [this] {
+      if (!force_ && std::filesystem::exists(file_)) throw InputError(file_ + ": exists; --force replaces it");
+      write_procedural_vdb(file_, volume_);
+      return ExitCode::ok;
+    });
+    command->add_option("FILE", file_, "Path to write")->required();
+    command->add_option("--seed", volume_.seed, "Of the noise");
+    command->add_option("--resolution", volume_.resolution, "Voxels across");
+    command->add_flag("--half", volume_.half, "Store 16-bit values");
+    command->add_flag("--force", force_, "Replace a file that is there");
+  }
+
+  CLI::App app_{"Benchmark and validation harness for null-collision trackers", "nullmark"};
+  std::function<ExitCode()> action_;
+  RunCommand run_;
+  ReplayCommand replay_;
+  GateCommand gate_;
+  ReportCommand report_;
+  ListCommand list_;
+  ProceduralVdb volume_;
+  std::vector<std::string> files_;
+  std::string file_, baseline_, schema_, format_, output_, junit_, markdown_;
+  bool force_ = false, paired_ = false, cases_ = false, strict_ = false;
+};
+
+/// Cells of two trackers of one name could not be told apart.
+template <class Entry>
+void refuse_shared_names(const char* what) {
+  const std::string& name = Registry<Entry>::instance().taken_twice();
+  if (!name.empty())
+    throw InputError(fmt::format("two {} are registered as \"{}\"; give the plug-in's another name", what, name));
+}
+
+ExitCode guarded(int argc, char** argv) {
+  try {
+    refuse_shared_names<EstimatorEntry>("estimators");
+    refuse_shared_names<MediumEntry>("media");
+    refuse_shared_names<MajorantEntry>("majorants");
+    return CommandLine(argc, argv).execute();
+  } catch (const InputError& error) {
+    return report(ExitCode::input_error, error.what());
+  } catch (const MissingData& error) {
+    return report(ExitCode::input_error, error.what());
+  } catch (const ParameterError& error) {
+    return report(ExitCode::input_error, (error.parameter.empty() ? "" : error.parameter + ": ") + error.what());
+  } catch (const std::bad_alloc&) {
+    return report(ExitCode::input_error, "not enough memory for what is asked; use fewer rays, cells or grid cells");
+  } catch (const std::system_error& error) {
+    // Of fmt, where the terminal's or the pipe's end is a full disk.
+    return report(ExitCode::internal_error, error.what());
+  } catch (const std::exception& error) {
+    return report(ExitCode::internal_error, fmt::format("internal error: {}", error.what()));
+  }
+}
+
+}  // namespace
+
+int nullmark_main(int argc, char** argv) {
+  ExitCode code = guarded(argc, argv);
+  // A full disk or a closed pipe shows only here.
+  if (std::fflush(stdout) != 0 && code == ExitCode::ok)
+    code = report(ExitCode::internal_error, "standard output cannot be written");
+  return static_cast<int>(code);
+}
+
+}  // namespace nullmark

@@ -1,0 +1,253 @@
+#include "harness/model/exit_code.h"
+#include "harness/registry/estimator_entry.h"
+#include "harness/run/journal.h"
+#include "harness/testing/program.h"
+
+namespace nullmark {
+namespace {
+
+class Cli : public ProgramTest {
+ protected:
+  void SetUp() override {
+    ProgramTest::SetUp();
+    write("c.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
+      {"name":"e","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":50,
+       "matrix":{"estimator":["ratio","delta","residual_ratio"],"medium":["linear",{"type":"linear","end":2}]}}]})");
+  }
+
+  static int code(ExitCode exit) { return static_cast<int>(exit); }
+};
+
+TEST_F(Cli, RunWritesResultsAndRefusesToReplaceThem) {
+  EXPECT_EQ(run("run c.json"), 0) << read("err");
+  EXPECT_EQ(results("c.results.json").cells.size(), 6u);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "c.results.json.journal"));
+  EXPECT_NE(read("out").find("e: linear/end:2, global, transmittance"), std::string::npos);
+  EXPECT_EQ(run("run c.json"), code(ExitCode::input_error));
+  EXPECT_EQ(read("err"), "nullmark: c.results.json: exists; --resume completes it, --force replaces it\n");
+  EXPECT_EQ(run("run c.json --force"), 0);
+}
+
+TEST_F(Cli, NoOutputReplacesAnInputOrAnotherOutput) {
+  ASSERT_EQ(run("run c.json -o a.json"), 0) << read("err");
+  ASSERT_EQ(run("run c.json -o b.json"), 0) << read("err");
+  std::filesystem::create_symlink("a.json", folder_ / "link");
+  std::filesystem::create_hard_link(folder_ / "a.json", folder_ / "hard");
+  std::filesystem::create_symlink("new.html", folder_ / "dangling");
+  std::filesystem::create_directory(folder_ / "folder");
+  std::filesystem::copy_file(folder_ / "c.json", folder_ / "folder/d.json");
+  write("v.vdb", "a volume");
+  write("v.json", R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
+      "matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"v.vdb"}}}]})");
+  const std::string before = read("a.json"), config = read("c.json");
+  for (const char* arguments :
+       {"report a.json -o a.json", "report a.json -o ./folder/../a.json", "report a.json b.json -o link", "report a.json -o hard",
+        "report a.json -o c.html --markdown c.html", "report a.json -o new.html --markdown dangling",
+        "compare a.json b.json --markdown a.json", "check a.json --junit a.json", "check a.json --junit x --markdown ./x",
+        "export a.json --format csv -o a.json", "merge a.json b.json -o a.json --force", "run c.json -o c.json --force",
+        "run folder -o folder/d.json --force", "run v.json -o v.vdb --force", "gate --baseline a.json b.json --junit a.json"}) {
+    EXPECT_EQ(run(arguments), code(ExitCode::input_error)) << arguments;
+    const std::string error = read("err");
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << arguments << ": " << error;
+    EXPECT_NE(error.find("give "), std::string::npos) << error;
+    EXPECT_EQ(read("out"), "") << arguments;
+    ASSERT_TRUE(read("a.json") == before) << arguments;
+  }
+  EXPECT_EQ(read("c.json"), config);
+  EXPECT_EQ(read("folder/d.json"), config);
+  EXPECT_EQ(read("v.vdb"), "a volume");
+  for (const char* absent : {"c.html", "new.html", "x", "c.json.journal"})
+    EXPECT_FALSE(std::filesystem::exists(folder_ / absent));
+}
+
+TEST_F(Cli, StandardOutputCarriesOnlyTheResults) {
+  EXPECT_EQ(run("run - -o -", NULLMARK_PROGRAM, "c.json"), 0) << read("err");
+  EXPECT_EQ(read_results(read("out"), "out").cells.size(), 6u);
+}
+
+TEST_F(Cli, StatisticsDoNotDependOnThreadsShardsOrResume) {
+  ASSERT_EQ(run("run c.json -o whole.json --threads 1"), 0);
+  const std::string expected = statistics_text(results("whole.json"));
+  ASSERT_EQ(run("run c.json -o threads.json --threads 3"), 0);
+  EXPECT_EQ(statistics_text(results("threads.json")), expected);
+  ASSERT_EQ(run("run c.json -o a.json --shard 1/2"), 0);
+  ASSERT_EQ(run("run c.json -o b.json --shard 2/2"), 0);
+  EXPECT_EQ(results("a.json").cells.size(), 3u);
+  ASSERT_EQ(run("merge b.json a.json -o merged.json"), 0) << read("err");
+  EXPECT_EQ(statistics_text(results("merged.json")), expected);
+  ASSERT_EQ(run("run c.json -o parts.json --filter ^ratio"), 0);
+  EXPECT_EQ(results("parts.json").cells.size(), 2u);
+  ASSERT_EQ(run("run c.json -o parts.json --resume"), 0) << read("err");
+  EXPECT_NE(read("err").find("[4/4]"), std::string::npos) << read("err");
+  EXPECT_EQ(statistics_text(results("parts.json")), expected);
+}
+
+TEST_F(Cli, ResumesFromTheJournalOfAKilledRun) {
+  ASSERT_EQ(run("run c.json -o whole.json"), 0);
+  const RunRecord whole = results("whole.json");
+  {
+    Journal journal((folder_ / "r.json").string(), Json::parse(read("whole.json"))["config_hash"], Journal::Mode::fresh);
+    journal.append(whole.cells[4]);
+    EXPECT_EQ(run("run c.json -o r.json --force"), code(ExitCode::input_error)) << "the journal is locked";
+  }
+  EXPECT_EQ(run("run c.json -o r.json"), code(ExitCode::input_error));
+  EXPECT_EQ(run("run c.json -o r.json --resume --seed 2"), code(ExitCode::input_error));
+  EXPECT_EQ(run("run c.json -o r.json --resume"), 0) << read("err");
+  EXPECT_NE(read("err").find("[5/5]"), std::string::npos) << read("err");
+  EXPECT_EQ(statistics_text(results("r.json")), statistics_text(whole));
+}
+
+TEST_F(Cli, SeedsChangeStatisticsAndAreRecorded) {
+  ASSERT_EQ(run("run c.json -o a.json --seed 7"), 0);
+  EXPECT_EQ(results("a.json").cells[0].cell.seed, 7u);
+  ASSERT_EQ(run("run c.json -o b.json --seed random"), 0);
+  EXPECT_NE(statistics_text(results("a.json")), statistics_text(results("b.json")));
+}
+
+TEST_F(Cli, InterruptKeepsWhatIsDone) {
+  write("long.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
+      {"name":"e","rays":{"type":"orthographic"},"samples_per_ray":[1],"matrix":{"estimator":"ratio","medium":["linear"]}},
+      {"name":"f","rays":{"type":"orthographic","width":64,"height":64},"samples_per_ray":2000000,"matrix":{"estimator":"ratio","medium":["linear"]}}]})");
+  const std::string command =
+      "cd '" + folder_.string() + "' && { timeout --preserve-status -s INT 3 '" NULLMARK_PROGRAM "' run long.json >out 2>err; }";
+  const int status = std::system(command.c_str());
+  EXPECT_EQ(WEXITSTATUS(status), code(ExitCode::interrupted));
+  const RunRecord partial = results("long.results.json");
+  ASSERT_EQ(partial.cells.size(), 2u);
+  EXPECT_EQ(partial.cells[0].status, Status::ok);
+  EXPECT_EQ(partial.cells[1].status, Status::not_run);
+}
+
+TEST_F(Cli, ErrorsAreOneLineWithTheRightCode) {
+  write(
+      "bad.json",
+      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratoi","medium":"linear"}}]})");
+  write(
+      "clash.json",
+      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"linear","hi":[0,1,1]}}}]})");
+  write(
+      "missing.json",
+      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"nowhere.vdb"}}}]})");
+  write(
+      "optional.json",
+      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"nowhere.vdb","optional":true}}}]})");
+  const std::vector<std::pair<std::string, ExitCode>> cases = {{"rnu", ExitCode::input_error},
+                                                               {"run", ExitCode::input_error},
+                                                               {"run nowhere.json", ExitCode::input_error},
+                                                               {"run c.json --shard 3/2", ExitCode::input_error},
+                                                               {"run c.json --filter '('", ExitCode::input_error},
+                                                               {"run c.json --seed -1", ExitCode::input_error},
+                                                               {"run c.json --filter nothing", ExitCode::nothing_ran},
+                                                               {"run bad.json", ExitCode::input_error},
+                                                               {"run clash.json", ExitCode::input_error},
+                                                               {"run missing.json", ExitCode::input_error},
+                                                               {"compare c.json", ExitCode::input_error},
+                                                               {"list estimator", ExitCode::input_error}};
+  for (const auto& [arguments, exit] : cases) {
+    EXPECT_EQ(run(arguments), code(exit)) << arguments;
+    const std::string error = read("err");
+    EXPECT_EQ(error.rfind("nullmark: ", 0), 0u) << arguments << ": " << error;
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << arguments << ": " << error;
+    EXPECT_EQ(read("out"), "") << arguments;
+  }
+  run("run clash.json");
+  EXPECT_EQ(read("err").rfind("nullmark: clash.json: /experiments/0/matrix/medium/hi: ", 0), 0u) << read("err");
+  EXPECT_EQ(run("run optional.json"), code(ExitCode::nothing_ran));
+  EXPECT_EQ(results("optional.results.json").cells.at(0).status, Status::skipped);
+}
+
+TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
+  ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");
+  std::filesystem::create_directory(folder_ / "folder");
+  const std::string results_text = read("r.json");
+  write("cut.json", results_text.substr(0, results_text.size() / 2));
+  write("empty.json", "");
+  write("page.html", "<!doctype html>");
+  write("other.json", "{\"a\": 1}");
+  const std::vector<std::pair<const char*, const char*>> cases = {
+      {"check nowhere.json", "nowhere.json: no such file"},
+      {"run nowhere.json", "nowhere.json: no such file"},
+      {"check folder", "folder: is a folder"},
+      {"check c.json", "c.json: is a configuration; `nullmark run` it first"},
+      {"run r.json", "r.json: these are results; nullmark check, compare and report read them"},
+      {"check other.json", "is no results file of nullmark"},
+      {"check page.html", "is no results file of nullmark"},
+      {"check cut.json", "ends in the middle"},
+      {"check empty.json", "is empty"},
+      {"list", "expected one of estimators, media"},
+      {"run c.json --thread 2", "unknown option \"--thread\"; did you mean \"--threads\"?"},
+      {"run c.json --thread=2", "did you mean \"--threads\"?"},
+      {"list quantites", "did you mean \"quantities\"?"},
+      {"schema confg", "did you mean \"config\"?"},
+      {"export r.json --format cvs", "did you mean \"csv\"?"},
+      {"compare r.json --baseline nosuch", "they have delta, ratio, residual_ratio"},
+      {"report r.json -o r.html --figures c.json", "--figures: c.json: "},
+      {"report r.json -o r.html --figures c.json/x", "is no folder"}};
+  for (const auto& [arguments, words] : cases) {
+    EXPECT_EQ(run(arguments), code(ExitCode::input_error)) << arguments;
+    const std::string error = read("err");
+    EXPECT_NE(error.find(words), std::string::npos) << arguments << ": " << error;
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << arguments << ": " << error;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "r.html"));
+  EXPECT_EQ(run(""), 0);
+  EXPECT_NE(read("out").find("compare"), std::string::npos);
+}
+
+TEST_F(Cli, FiguresWithoutABrowserAreRefusedAtOnce) {
+  ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");
+  const char* path = std::getenv("PATH");
+  const std::string before = path ? path : "";
+  ::setenv("PATH", folder_.c_str(), 1);
+  const std::string command =
+      fmt::format("cd '{}' && '{}' report r.json -o r.html --figures f 2>err", folder_.string(), NULLMARK_PROGRAM);
+  const int status = std::system(command.c_str());
+  ::setenv("PATH", before.c_str(), 1);
+  EXPECT_EQ(WEXITSTATUS(status), code(ExitCode::input_error));
+  EXPECT_NE(read("err").find("apt install chromium"), std::string::npos) << read("err");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "r.html"));
+}
+
+TEST_F(Cli, TimingTellsHowFarItIs) {
+  write("t.json", R"({"$schema":"nullmark/config/1","timing":{"repetitions":2,"seconds":0.0001},"experiments":[
+      {"name":"e","rays":"single","samples_per_ray":10,"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}]})");
+  ASSERT_EQ(run("run t.json"), 0) << read("err");
+  EXPECT_NE(read("err").find("timing 1/2\ntiming 2/2\n"), std::string::npos) << read("err");
+}
+
+TEST_F(Cli, ListsSchemasAndVersion) {
+  for (const char* what : {"estimators", "media", "majorants", "rays", "quantities"}) {
+    EXPECT_EQ(run(std::string("list ") + what), 0);
+    EXPECT_EQ(run(std::string("list --json ") + what), 0);
+    EXPECT_FALSE(Json::parse(read("out")).empty()) << what;
+  }
+  EXPECT_EQ(run("list --json estimators"), 0);
+  for (const Json& entry : Json::parse(read("out"))) {
+    const std::string name = entry["name"].get<std::string>();
+    const auto source = Registry<EstimatorEntry>::instance().find(name)->make();
+    const bool in_float = source->kernel(1, Precision::float32) != nullptr;
+    EXPECT_EQ(entry["lanes"].get<bool>(), in_float) << name;
+    EXPECT_EQ(entry["precisions"].size(), in_float ? 2u : 1u) << name;
+  }
+  for (const char* which : {"config", "results"}) {
+    EXPECT_EQ(run(std::string("schema ") + which), 0);
+    EXPECT_EQ(Json::parse(read("out"))["$schema"], "http://json-schema.org/draft-07/schema#");
+  }
+  EXPECT_EQ(run("--version"), 0);
+  EXPECT_EQ(read("out").rfind("nullmark ", 0), 0u);
+  EXPECT_EQ(run("run --help"), 0);
+  EXPECT_EQ(run("run c.json --dry-run"), 0);
+  EXPECT_NE(read("out").find("6 cells"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "c.results.json"));
+}
+
+TEST_F(Cli, ADryRunOfNothingEndsAsTheRunWould) {
+  write("v.json", R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
+      "matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"absent.vdb","optional":true}}}]})");
+  EXPECT_EQ(run("run v.json --dry-run"), code(ExitCode::nothing_ran));
+  EXPECT_EQ(read("err"), "nullmark: nothing would run: all cells are skipped\n");
+  EXPECT_EQ(run("run v.json"), code(ExitCode::nothing_ran));
+}
+
+}  // namespace
+}  // namespace nullmark

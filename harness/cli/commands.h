@@ -1,0 +1,61 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/model/exit_code.h"
+
+namespace nullmark {
+
+/// `nullmark run`.
+struct RunCommand {
+  std::vector<std::string> configs;
+  std::string output;     ///< empty: by the configuration's name; "-": standard output
+  std::string seed;       ///< empty: the configuration's; "random"; or a number
+  std::string filter;     ///< regular expression on cell names
+  bool covering = false;  ///< only cells that are covering_cells
+  std::string shard;      ///< "K/N", 1 <= K <= N
+  int threads = 0;
+  std::optional<double> time_budget;
+  bool resume = false, force = false, dry_run = false, no_timing = false;
+  std::vector<std::string> command_line;
+};
+ExitCode run_command(const RunCommand& command);
+
+/// `nullmark replay`.
+struct ReplayCommand {
+  std::string results, cell;
+  std::string ray, sample;  ///< whole numbers; empty: to be searched for
+  bool json = false;
+};
+ExitCode replay_command(const ReplayCommand& command);
+
+/// `nullmark gate`.
+struct GateCommand {
+  std::string baseline;             ///< results, a baseline, or a folder of baselines
+  std::string results;              ///< of `nullmark run`
+  std::optional<double> threshold;  ///< percent, in place of the tiers' own
+  std::string blocks;               ///< folder of interleaved runs; empty: no wall time
+  std::string junit, markdown;      ///< files; empty: none
+  bool update = false, quiet_machine = false;
+};
+ExitCode gate_command(const GateCommand& command);
+
+/// `nullmark report`.
+struct ReportCommand {
+  std::vector<std::string> results;
+  std::string output;             ///< the page
+  std::string baseline;           ///< tracker that others are compared with; empty: the fastest unbiased one
+  std::string figures, markdown;  ///< folder and file; empty: none
+};
+ExitCode report_command(const ReportCommand& command);
+
+/// `nullmark list`.
+struct ListCommand {
+  std::string what;  ///< "estimators", "media", "majorants", "rays" or "quantities"
+  bool json = false;
+};
+ExitCode list_command(const ListCommand& command);
+
+}  // namespace nullmark

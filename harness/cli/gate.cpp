@@ -1,0 +1,74 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "harness/cli/commands.h"
+#include "harness/io/file_io.h"
+#include "harness/io/json_input.h"
+#include "harness/io/outputs.h"
+#include "harness/performance_gate/baseline.h"
+#include "harness/performance_gate/report.h"
+#include "harness/performance_gate/wall_time.h"
+
+namespace nullmark {
+namespace {
+
+void deliver(const GateCommand& command, const PerformanceReport& report) {
+  if (!command.junit.empty()) write_atomically(command.junit, performance_junit(report));
+  if (!command.markdown.empty()) write_atomically(command.markdown, performance_markdown(report));
+  fmt::print("{}", performance_text(report));
+}
+
+/// Makes the results the baseline of their configuration and build, and shows what that changes.
+ExitCode update(const GateCommand& command, const Counts& fresh, std::optional<Real> threshold) {
+  if (fresh.baseline) throw InputError(command.results + ": is a baseline itself; expected results of `nullmark run`");
+  if (fresh.cells.empty())
+    throw InputError(command.results + ": holds no cell that was sampled; expected at least one, or the baseline guards nothing");
+  if (!fresh.build.known())
+    throw InputError(command.results + ": does not say what it was built for; run the configuration again with this program");
+  const std::filesystem::path path(command.baseline);
+  const bool folder = std::filesystem::is_directory(path) || path.extension() != ".json";
+  const std::string file = folder ? (path / baseline_file_name(fresh)).string() : command.baseline;
+  std::string text = baseline_text(fresh);
+  if (std::filesystem::exists(file)) {
+    const Counts before = read_counts(file);
+    if (!before.baseline || before.name != fresh.name || !(before.build == fresh.build))
+      throw InputError(fmt::format("{}: holds {}, which --update does not replace; name the folder of the baselines", file,
+                                   before.baseline ? "the baseline of another configuration or build" : "results"));
+    text = baseline_text(refreshed(before, fresh));
+    deliver(command, compare_counts(before, fresh, threshold));
+  }
+  if (const std::filesystem::path parent = std::filesystem::path(file).parent_path(); !parent.empty())
+    std::filesystem::create_directories(parent);
+  write_atomically(file, text);
+  fmt::print("baseline: {}\n", file);
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+ExitCode gate_command(const GateCommand& command) {
+  refuse_overwriting({command.results, command.baseline, command.blocks}, {command.junit, command.markdown});
+  const Counts fresh = read_counts(command.results);
+  std::optional<Real> threshold;
+  if (command.threshold) threshold = *command.threshold / 100;
+  if (command.update) return update(command, fresh, threshold);
+
+  std::string remedy;
+  const std::optional<Counts> before = std::filesystem::is_directory(command.baseline)
+                                           ? find_baseline(command.baseline, fresh, remedy)
+                                           : std::optional(read_counts(command.baseline));
+  if (!before) {
+    fmt::print(stderr, "nullmark: {}\n", remedy);
+    return ExitCode::nothing_ran;
+  }
+  PerformanceReport report = compare_counts(*before, fresh, threshold);
+  if (!command.blocks.empty()) {
+    const std::vector<GateRow> rows = compare_wall_time(read_blocks(command.blocks), threshold, command.quiet_machine);
+    report.rows.insert(report.rows.end(), rows.begin(), rows.end());
+  }
+  deliver(command, report);
+  return report.exit();
+}
+
+}  // namespace nullmark

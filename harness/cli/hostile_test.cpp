@@ -1,0 +1,134 @@
+// Small files that ask for much: refused in one line, before memory or the stack is gone.
+
+#include <gtest/gtest.h>
+
+#include "harness/config/config.h"
+#include "harness/io/json_input.h"
+#include "harness/model/exit_code.h"
+#include "harness/sampling/ray_memory.h"
+#include "harness/testing/program.h"
+
+namespace nullmark {
+namespace {
+
+std::string error_of(const std::string& config) {
+  try {
+    read_config(config, "c.json");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+std::string repeated(const std::string& text, int times) {
+  std::string all;
+  for (int n = 0; n < times; ++n) all += text;
+  return all;
+}
+
+/// A list of so many numbers, as a sweep.
+std::string sweep(int numbers) {
+  std::string list = "[";
+  for (int n = 1; n <= numbers; ++n) list += std::to_string(n) + (n < numbers ? "," : "]");
+  return list;
+}
+
+std::string config(const std::string& medium, const std::string& more) {
+  return R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","matrix":{"estimator":"ratio","medium":)" +
+         medium + "," + more + "}}]}";
+}
+
+TEST(Hostile, DeepNestingIsRefusedWhereItBegins) {
+  for (const char* bracket : {"[", "{\"a\":"}) {
+    try {
+      parse_json(repeated(bracket, 1'000'000), "deep.json");
+      FAIL();
+    } catch (const InputError& error) {
+      EXPECT_EQ(std::string(error.what()).rfind("deep.json:1:", 0), 0u) << error.what();
+      EXPECT_NE(std::string(error.what()).find("nested more than 100 deep"), std::string::npos) << error.what();
+    }
+  }
+  EXPECT_NO_THROW(parse_json(repeated("[", 100) + repeated("]", 100), "deep.json"));
+}
+
+TEST(Hostile, SweepsThatMultiplyAreRefused) {
+  const std::string thousand = sweep(1000);
+  const std::string linear = R"({"type":"linear","begin":)" + thousand + R"(,"end":)" + thousand + "}";
+  EXPECT_EQ(error_of(config(linear, R"("samples_per_ray":1)")),
+            "c.json: /experiments/0/matrix/medium: its sweeps make more than 100000 cells; split them into several files");
+  EXPECT_EQ(error_of(config(R"("linear")", R"("samples_per_ray":)" + thousand + R"(,"seed":)" + thousand)),
+            "c.json: /experiments/0/matrix: its sweeps make more than 100000 cells; split them into several files");
+}
+
+/// Seconds, not hours, for as many as are allowed.
+TEST(Hostile, ManyCellsAreExpandedInLinearTime) {
+  const std::string text =
+      config(R"({"type":"linear","begin":)" + sweep(200) + R"(,"end":)" + sweep(100) + "}", R"("samples_per_ray":1)");
+  EXPECT_EQ(read_config(text, "c.json").cells.size(), 20000u);
+}
+
+/// A thousand cells on the same rays.
+std::string many_rays(const std::string& rays) {
+  return R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","samples_per_ray":1,"matrix":{"estimator":"ratio","rays":)" +
+         rays + R"(,"medium":{"type":"linear","end":)" + sweep(1000) + "}}}]}";
+}
+
+TEST(Hostile, RaysThatNoMachineHoldsAreRefused) {
+  for (const char* rays :
+       {R"({"type":"orthographic","width":16384,"height":16384})", R"({"type":"perspective","width":16384,"height":16384})",
+        R"({"type":"chords","count":100000000})", R"({"type":"inside","count":100000000})"})
+    try {
+      const Plan plan = read_config(many_rays(rays), "c.json");
+      expect_rays_fit(plan, [](std::size_t) { return true; });
+      ADD_FAILURE() << rays;
+    } catch (const ParameterError& error) {
+      EXPECT_EQ(error.parameter, "c.json: /experiments/0/matrix/rays");
+      const std::string message = error.what();
+      EXPECT_NE(message.find(" rays, with those of the cells before them, take at least "), std::string::npos) << message;
+      EXPECT_NE(message.find("make fewer rays"), std::string::npos) << message;
+      EXPECT_EQ(message.find('\n'), std::string::npos);
+    }
+  const Plan plan = read_config(many_rays(R"({"type":"orthographic","width":16384,"height":16384})"), "c.json");
+  EXPECT_NO_THROW(expect_rays_fit(plan, [](std::size_t) { return false; })) << "only what is to run counts";
+}
+
+class HostileFiles : public ProgramTest {};
+
+/// Within a limit of addresses, so that a program that did ask for the memory would not get it.
+TEST_F(HostileFiles, RaysAreCountedBeforeTheyAreMade) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers take all addresses";
+#endif
+  write("c.json", many_rays(R"({"type":"perspective","width":16384,"height":16384})"));
+  for (const char* command : {"run c.json", "run c.json --dry-run"}) {
+    const std::string limited =
+        fmt::format("ulimit -v 4000000; cd '{}' && '{}' {} >out 2>err", folder_.string(), NULLMARK_PROGRAM, command);
+    EXPECT_EQ(WEXITSTATUS(std::system(limited.c_str())), static_cast<int>(ExitCode::input_error));
+    const std::string error = read("err");
+    EXPECT_EQ(error.rfind("nullmark: c.json: /experiments/0/matrix/rays: 268435456 rays", 0), 0u) << error;
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << error;
+  }
+}
+
+TEST_F(HostileFiles, LinksToResultsStayLinks) {
+  std::filesystem::create_directories(folder_ / "elsewhere");
+  std::ofstream(folder_ / "elsewhere/r.json") << "old";
+  std::filesystem::create_symlink("elsewhere/r.json", folder_ / "link.json");
+  write_atomically((folder_ / "link.json").string(), "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "link.json"));
+  EXPECT_EQ(read("elsewhere/r.json"), "new");
+}
+
+TEST_F(HostileFiles, LeftoversOfTheDeadAreRemovedAndNoOthers) {
+  const std::string live = "r.json." + std::to_string(::getpid()) + ".tmp";
+  for (const std::string& name :
+       {std::string("r.json.2147483646.tmp"), std::string("r.json.notes.tmp"), live, std::string("s.json.2147483646.tmp")})
+    write(name, "half");
+  remove_leftovers((folder_ / "r.json").string());
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "r.json.2147483646.tmp"));
+  for (const std::string& name : {std::string("r.json.notes.tmp"), live, std::string("s.json.2147483646.tmp")})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / name)) << name;
+}
+
+}  // namespace
+}  // namespace nullmark

@@ -1,0 +1,37 @@
+#include "harness/run/replay.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "harness/cli/commands.h"
+#include "harness/io/file_io.h"
+#include "harness/io/results_json.h"
+
+namespace nullmark {
+namespace {
+
+/// Empty where nothing is asked for.
+std::optional<std::uint64_t> index_of(const std::string& text, const char* option) {
+  if (text.empty()) return {};
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw InputError(fmt::format("{}: found \"{}\"; expected a whole number from 0", option, text));
+  return value;
+}
+
+}  // namespace
+
+ExitCode replay_command(const ReplayCommand& command) {
+  const SampleChoice choice{index_of(command.ray, "--ray"), index_of(command.sample, "--sample")};
+  const RunRecord run = read_results(read_file(command.results), command.results);
+  const Replay replay = replay_sample(run, command.results, command.cell, choice);
+  if (command.json)
+    fmt::print("{}\n", replay_json(replay).dump(2));
+  else
+    fmt::print("{}", replay_text(replay));
+  return ExitCode::ok;
+}
+
+}  // namespace nullmark

@@ -1,0 +1,347 @@
+#include "harness/run/run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <random>
+#include <regex>
+#include <set>
+#include <thread>
+
+#include "harness/cli/commands.h"
+#include "harness/config/config.h"
+#include "harness/io/file_io.h"
+#include "harness/io/outputs.h"
+#include "harness/io/results_json.h"
+#include "harness/io/spec_json.h"
+#include "harness/io/text.h"
+#include "harness/registry/environment_variables.h"
+#include "harness/report/results_tables.h"
+#include "harness/report/warnings.h"
+#include "harness/run/covering.h"
+#include "harness/run/journal.h"
+#include "harness/run/predict.h"
+#include "harness/run/progress.h"
+#include "harness/run/provenance.h"
+
+namespace nullmark {
+namespace {
+
+std::atomic<int> received_signal{0};
+
+/// Has SIGINT and SIGTERM end the run after the samples under way; a second one ends the program at once.
+void catch_signals() {
+  struct sigaction action = {};
+  action.sa_handler = [](int number) { received_signal = number; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+}
+
+template <class Number>
+std::optional<Number> parsed(std::string_view text) {
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+std::optional<std::uint64_t> requested_seed(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  if (text == "random") {
+    std::random_device device;
+    const std::uint64_t seed = (std::uint64_t{device()} << 32) | device();
+    fmt::print(stderr, "nullmark: seed {}\n", seed);
+    return seed;
+  }
+  const auto seed = parsed<std::uint64_t>(text);
+  if (!seed) throw InputError(fmt::format("--seed: found \"{}\"; expected a whole number >= 0 or \"random\"", text));
+  return seed;
+}
+
+struct Shard {
+  std::size_t index = 0, count = 1;
+};
+
+Shard requested_shard(const std::string& text) {
+  if (text.empty()) return {};
+  const std::size_t slash = text.find('/');
+  if (slash != std::string::npos) {
+    const auto index = parsed<std::size_t>(std::string_view(text).substr(0, slash));
+    const auto count = parsed<std::size_t>(std::string_view(text).substr(slash + 1));
+    if (index && count && *index >= 1 && *index <= *count) return {*index - 1, *count};
+  }
+  throw InputError(fmt::format("--shard: found \"{}\"; expected K/N with 1 <= K <= N, as in 2/4", text));
+}
+
+/// The cells of a plan that `--filter` and `--covering` pick.
+std::vector<bool> filtered(const Plan& plan, const RunCommand& command) {
+  std::regex pattern;
+  try {
+    pattern = std::regex(command.filter);
+  } catch (const std::regex_error& error) {
+    throw InputError(fmt::format("--filter: found \"{}\"; expected a regular expression: {}", command.filter, error.what()));
+  }
+  std::vector<bool> wanted = command.covering ? covering_cells(plan) : std::vector<bool>(plan.cells.size(), true);
+  for (std::size_t i = 0; i < plan.cells.size(); ++i)
+    wanted[i] = wanted[i] && (command.filter.empty() || std::regex_search(plan.cells[i].name, pattern));
+  return wanted;
+}
+
+/// Those of the wanted cells that are of the shard.
+std::vector<bool> of_shard(const std::vector<bool>& wanted, const RunCommand& command) {
+  const Shard shard = requested_shard(command.shard);
+  std::vector<bool> selected = wanted;
+  for (std::size_t i = 0; i < selected.size(); ++i) selected[i] = wanted[i] && i % shard.count == shard.index;
+  return selected;
+}
+
+std::string default_output(const std::string& config) {
+  if (config == "-") return "stdin.results.json";
+  std::filesystem::path path(config);
+  if (!path.has_filename()) path = path.parent_path();
+  const bool file = path.extension() == ".json";
+  return (file ? path.stem() : path.filename()).string() + ".results.json";
+}
+
+std::string percent(double fraction) { return fmt::format("{:.2g} %", 100 * fraction); }
+
+/// What each cell would cost and how small a bias its samples would show.
+ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
+  // Stands for a machine that has not been measured yet.
+  constexpr double kNsPerLookup = 5;
+  // A pooled bias of five standard errors is hardly chance, whatever the number of cells.
+  constexpr double kStandardErrors = 5;
+  const std::vector<Prediction> predictions = predict(plan, selected);
+  std::vector<std::vector<std::string>> lines = {{"cell", "rays", "samples/ray", "lookups/sample", "lookups", "seconds",
+                                                  "bias shown from", "planned/ray", "verdict", "status"}};
+  double total_samples = 0, total_lookups = 0, lookups_to_decide = 0;
+  bool all_known = true, any = false;
+  for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i) {
+    if (!selected[i]) continue;
+    const Prediction& prediction = predictions[next++];
+    const double samples = static_cast<double>(prediction.rays) * static_cast<double>(prediction.samples_per_ray);
+    std::optional<double> lookups, shown;
+    if (prediction.lookups_per_sample) lookups = samples * *prediction.lookups_per_sample;
+    if (prediction.relative_variance && samples > 0) shown = kStandardErrors * std::sqrt(*prediction.relative_variance / samples);
+    lines.push_back({plan.cells[i].name, fmt::to_string(prediction.rays), fmt::to_string(prediction.samples_per_ray),
+                     short_number(prediction.lookups_per_sample), short_number(lookups),
+                     short_number(lookups ? std::optional(*lookups * kNsPerLookup * 1e-9) : std::nullopt),
+                     shown ? percent(*shown) : "-", short_number(static_cast<Real>(prediction.planned)), prediction.verdict,
+                     prediction.status});
+    if (prediction.status != "ok") continue;
+    any = true;
+    total_samples += samples;
+    total_lookups += lookups.value_or(0);
+    if (prediction.verdict == "PASS")
+      lookups_to_decide += lookups.value_or(0) * std::max(1., static_cast<double>(prediction.planned) /
+                                                                  static_cast<double>(prediction.samples_per_ray));
+    else
+      lookups_to_decide += lookups.value_or(0);
+    all_known &= lookups.has_value();
+  }
+  fmt::print(
+      "{}\n{} cells, {:.4g} samples, {}{:.4g} lookups, about {:.3g} s of one core at {} ns per lookup, timing not counted; about "
+      "{:.4g} lookups with what the verdicts take\n",
+      aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
+      total_lookups * kNsPerLookup * 1e-9, kNsPerLookup, lookups_to_decide);
+  if (any) return ExitCode::ok;
+  fmt::print(stderr, "nullmark: nothing would run: all cells are skipped\n");
+  return ExitCode::nothing_ran;
+}
+
+/// What earlier runs of the same configuration left, by place in the plan.
+using Earlier = std::map<std::size_t, CellRecord>;
+
+void keep(const Plan& plan, std::vector<CellRecord> records, Earlier& earlier) {
+  std::map<std::pair<std::string, std::string>, std::size_t> places;
+  for (std::size_t i = 0; i < plan.cells.size(); ++i) places[{plan.cells[i].id, plan.cells[i].name}] = i;
+  for (CellRecord& record : records)
+    if (const auto at = places.find({record.cell.id, record.cell.name}); at != places.end())
+      earlier[at->second] = std::move(record);
+}
+
+/// The record of a cell under the plan's own name for it: cells of different experiments may share statistics.
+CellRecord placed(CellRecord record, const Cell& cell) {
+  const std::uint64_t samples = record.cell.samples_per_ray;
+  record.cell = cell;
+  if (cell.equal_lookups) record.cell.samples_per_ray = samples;
+  return record;
+}
+
+Earlier earlier_results(const Plan& plan, const std::string& output, const Journal& journal) {
+  Earlier earlier;
+  if (std::filesystem::exists(output)) {
+    RunRecord before = read_results(read_file(output), output);
+    if (before.config_text != plan.config_text)
+      throw InputError(output + ": holds results of another configuration or seed; --force replaces them");
+    keep(plan, std::move(before.cells), earlier);
+  }
+  keep(plan, journal.cells(), earlier);
+  return earlier;
+}
+
+/// Files that the run reads: configurations and the volumes of its media.
+std::vector<std::string> inputs_of(const std::vector<ConfigSource>& sources, const Plan& plan) {
+  std::vector<std::string> files;
+  files.reserve(sources.size());
+  for (const ConfigSource& source : sources) files.push_back(source.file);
+  const std::function<void(const MediumSpec&)> add = [&](const MediumSpec& medium) {
+    if (const auto file = medium.field.values.find("file"); file != medium.field.values.end())
+      if (const auto* path = std::get_if<std::string>(&file->second)) try {
+          files.push_back(with_variables(*path));
+        } catch (const MissingData&) {
+          // Then there is no file to protect.
+        }
+    for (const auto* others : {&medium.per_channel, &medium.emission_field})
+      for (const MediumSpec& other : *others) add(other);
+  };
+  for (const MediumSpec& medium : plan.media) add(medium);
+  return files;
+}
+
+ExitCode outcome(const std::vector<CellRecord>& cells) {
+  if (received_signal != 0) return received_signal == SIGINT ? ExitCode::interrupted : ExitCode::terminated;
+  bool any_ok = false;
+  for (const CellRecord& cell : cells) {
+    if (cell.status == Status::error) return ExitCode::internal_error;
+    any_ok |= cell.status == Status::ok;
+  }
+  if (any_ok) return ExitCode::ok;
+  fmt::print(stderr, "nullmark: nothing ran: all cells were skipped or not started\n");
+  return ExitCode::nothing_ran;
+}
+
+void warn_of_own_seeds(const Plan& plan, std::uint64_t seed) {
+  const auto own = std::find_if(plan.cells.begin(), plan.cells.end(), [&](const Cell& cell) { return cell.seed != seed; });
+  if (own != plan.cells.end())
+    fmt::print(stderr, "nullmark: warning: experiment \"{}\" names its seeds itself; --seed does not change them\n",
+               own->experiment);
+}
+
+/// Throws InputError where the output may not be written, or is there and neither to be completed nor replaced.
+std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vector<ConfigSource>& sources, const Plan& plan,
+                                      const std::string& output) {
+  refuse_overwriting(inputs_of(sources, plan), {output, Journal::path_for(output)});
+  if (std::filesystem::is_directory(output)) throw InputError(output + ": is a folder; expected the path of a results file");
+  using Mode = Journal::Mode;
+  auto journal = std::make_unique<Journal>(output, config_hash(plan.config_text),
+                                           command.resume  ? Mode::resume
+                                           : command.force ? Mode::overwrite
+                                                           : Mode::fresh);
+  if (!command.resume && !command.force && std::filesystem::exists(output))
+    throw InputError(output + ": exists; --resume completes it, --force replaces it");
+  return journal;
+}
+
+RunContext context_of(const RunCommand& command, const Plan& plan) {
+  RunContext context;
+  context.command_line = command.command_line;
+  context.filter = command.filter;
+  context.covering = command.covering;
+  context.shard = command.shard;
+  context.threads = command.threads > 0 ? command.threads : static_cast<int>(std::thread::hardware_concurrency());
+  std::set<std::uint64_t> seeds;
+  for (const Cell& cell : plan.cells) seeds.insert(cell.seed);
+  context.seeds.assign(seeds.begin(), seeds.end());
+  return context;
+}
+
+/// `output` is empty where results go to standard output, and pictures nowhere.
+RunOptions options_of(const RunCommand& command, const std::string& output) {
+  RunOptions options;
+  options.threads = command.threads;
+  options.time_budget = command.time_budget;
+  options.timing = !command.no_timing;
+  options.interrupted = &received_signal;
+  if (!output.empty()) {
+    const std::filesystem::path images = std::filesystem::path(output).replace_extension(".images");
+    options.image_directory = images.string();
+    options.image_prefix = images.filename().string();
+  }
+  return options;
+}
+
+}  // namespace
+
+ExitCode run_command(const RunCommand& command) {
+  const std::vector<ConfigSource> sources = load_configs(command.configs);
+  const std::optional<std::uint64_t> seed = requested_seed(command.seed);
+  const Plan plan = read_configs(sources, seed);
+  const std::vector<bool> wanted = filtered(plan, command), selected = of_shard(wanted, command);
+  const auto count = static_cast<std::size_t>(std::count(selected.begin(), selected.end(), true));
+  if (count == 0) {
+    fmt::print(stderr, "nullmark: nothing selected: none of {} cells passes --filter, --covering and --shard\n",
+               plan.cells.size());
+    return ExitCode::nothing_ran;
+  }
+  if (seed) warn_of_own_seeds(plan, *seed);
+  if (command.dry_run) return dry_run(plan, selected);
+
+  const bool to_stdout = command.output == "-";
+  const std::string output = command.output.empty() ? default_output(command.configs.front()) : command.output;
+  std::unique_ptr<Journal> journal;
+  Earlier earlier;
+  if (!to_stdout) {
+    journal = open_journal(command, sources, plan, output);
+    if (command.resume) earlier = earlier_results(plan, output, *journal);
+  }
+  RunContext context = context_of(command, plan);
+  const RunOptions options = options_of(command, to_stdout ? "" : output);
+
+  // What was there before was selected then.
+  for (std::size_t i = 0; i < plan.cells.size(); ++i) context.selected += wanted[i] || earlier.contains(i);
+
+  std::vector<CellRecord> finished;
+  for (const auto& [place, record] : earlier)
+    if (selected[place] && record.status == Status::ok) finished.push_back(placed(record, plan.cells[place]));
+
+  catch_signals();
+  RunRecord run;
+  {
+    Progress progress(count - finished.size());
+    RunObserver observer;
+    observer.cell_done = [&](const CellRecord& record, std::size_t done, std::size_t total) {
+      if (journal && (record.status == Status::ok || record.status == Status::error)) journal->append(record);
+      progress.cell_done(record, done, total);
+    };
+    observer.progress = [&](const CellRecord& record, double fraction) { progress.cell_progress(record, fraction); };
+    observer.timing = [&](double fraction) { progress.timing(fraction); };
+    observer.cell_timed = [&](const CellRecord& record) {
+      if (journal) journal->append(record);
+    };
+    observer.verdict_share = [&](double share) { context.verdict_share = share; };
+    observer.statistics_share = [&](double share) { context.statistics_share = share; };
+    observer.warning = [&](const std::string& message) { progress.warning(message); };
+    std::vector<CellRecord> records = run_plan(plan, selected, finished, options, observer);
+    for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i)
+      if (selected[i] && next < records.size()) earlier[i] = placed(std::move(records[next++]), plan.cells[i]);
+  }
+
+  run.name = plan.name;
+  run.config_text = plan.config_text;
+  run.provenance = make_provenance(context, std::chrono::system_clock::now());
+  run.tables = plan.tables;
+  run.claims = plan.claims;
+  for (auto& [place, record] : earlier) run.cells.push_back(std::move(record));
+  if (to_stdout) {
+    fmt::print("{}", results_text(run));
+  } else {
+    write_atomically(output, results_text(run));
+    journal->remove();
+    fmt::print("{}", results_tables(run));
+    fmt::print(stderr, "results: {}\n", output);
+    if (const auto remark = busy_remark(run)) fmt::print(stderr, "nullmark: warning: {}\n", *remark);
+  }
+  return outcome(run.cells);
+}
+
+}  // namespace nullmark

@@ -1,0 +1,260 @@
+#include "harness/config/config.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <set>
+
+#include "harness/config/cell_names.h"
+#include "harness/config/cell_patterns.h"
+#include "harness/config/component_reader.h"
+#include "harness/config/experiment.h"
+#include "harness/io/claims_json.h"
+#include "harness/io/spec_json.h"
+#include "harness/io/tables_json.h"
+#include "harness/model/names.h"
+
+namespace nullmark {
+namespace {
+
+/// Lists what cells refer to, equal specifications once.
+class PlanBuilder {
+ public:
+  explicit PlanBuilder(Plan& plan) : plan_(plan) {}
+
+  void add(const Draft& draft) {
+    Cell cell = draft.cell;
+    cell.estimator = *draft.estimator;
+    cell.medium = media_.index_of(plan_.media, *draft.medium);
+    plan_.media[cell.medium].optional &= draft.medium->optional;
+    cell.majorant = majorants_.index_of(plan_.majorants, *draft.majorant);
+    cell.rays = ray_sets_.index_of(plan_.ray_sets, *draft.rays);
+    plan_.cells.push_back(std::move(cell));
+  }
+
+ private:
+  /// Finds among thousands by label, which equal specifications share.
+  class Index {
+   public:
+    template <class Spec>
+    std::size_t index_of(std::vector<Spec>& list, const Spec& spec) {
+      std::vector<std::size_t>& places = of_label_[spec.label];
+      for (const std::size_t place : places)
+        if (list[place] == spec) return place;
+      places.push_back(list.size());
+      list.push_back(spec);
+      return list.size() - 1;
+    }
+
+   private:
+    std::map<std::string, std::vector<std::size_t>> of_label_;
+  };
+
+  Plan& plan_;
+  Index media_, majorants_, ray_sets_;
+};
+
+bool same_statistics(const Draft& a, const Draft& b) {
+  const auto agree = [&](const std::string& axis) { return agree_on(axis, a, b); };
+  return a.cell.experiment == b.cell.experiment && std::all_of(axes().begin(), axes().end(), agree) &&
+         a.cell.own_streams == b.cell.own_streams;
+}
+
+std::vector<std::uint64_t> read_batches(const Place& place) {
+  const auto one = [](const Place& number) { return number.unsigned_integer(1, 1u << 20); };
+  if (!place.json().is_array()) return {one(place)};
+  std::vector<std::uint64_t> batches;
+  for (const Place& element : place.elements()) {
+    batches.push_back(one(element));
+    if (batches.size() > 1 && batches.back() <= batches[batches.size() - 2]) element.expected("more than the number before it");
+  }
+  if (batches.empty()) place.expected("at least one number");
+  return batches;
+}
+
+TimingPlan read_timing(const Place& place) {
+  place.expect_keys({"enabled", "repetitions", "seconds", "samples_per_traversal"});
+  TimingPlan timing;
+  if (place.has("enabled")) timing.enabled = place["enabled"].boolean();
+  if (place.has("repetitions")) timing.repetitions = static_cast<int>(place["repetitions"].integer(1, 10'000));
+  if (place.has("seconds")) timing.seconds = place["seconds"].positive();
+  if (place.has("samples_per_traversal")) timing.samples_per_traversal = read_batches(place["samples_per_traversal"]);
+  return timing;
+}
+
+Real read_level(const Place& place) {
+  const Real value = place.number();
+  if (!(value > 0 && value < 1)) place.expected("a number between 0 and 1");
+  return value;
+}
+
+GateLevels read_levels(const Place& place) {
+  place.expect_keys({"alpha", "alpha_pass"});
+  GateLevels levels;
+  if (place.has("alpha")) levels.alpha = read_level(place["alpha"]);
+  if (place.has("alpha_pass")) levels.alpha_pass = read_level(place["alpha_pass"]);
+  return levels;
+}
+
+bool agree(const TimingPlan& a, const TimingPlan& b) {
+  return a.enabled == b.enabled && a.repetitions == b.repetitions && a.seconds == b.seconds &&
+         a.samples_per_traversal == b.samples_per_traversal;
+}
+
+/// One file, expanded, before cells have names.
+struct DraftPlan {
+  std::string file, name;
+  TimingPlan timing;
+  GateLevels levels;
+  std::vector<Draft> cells;
+  std::vector<std::string> experiments;
+  Json json;  ///< for what refers to cells, which is read when they have names
+  std::map<std::string, std::string> credits;
+};
+
+DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> seed) {
+  DraftPlan plan;
+  plan.json = parse_json(source.text, source.file);
+  const Json& json = plan.json;
+  const Place top(json, source.file);
+  if (json.is_object() && json.contains("nullmark_schema"))
+    throw InputError(source.file + ": these are results; nullmark check, compare and report read them");
+  top.expect_object();
+  if (json.empty() || json.begin().key() != "$schema")
+    top.fail(fmt::format("found {}; expected the first key \"$schema\": \"{}\"",
+                         json.empty() ? "an empty object" : "\"" + json.begin().key() + "\"", kConfigSchema));
+  if (top["$schema"].string() != kConfigSchema) top["$schema"].expected(fmt::format("\"{}\"", kConfigSchema));
+  top.expect_keys({"$schema", "name", "seed", "timing", "verdict", "experiments", "tables", "claims", "credits"});
+
+  plan.file = source.file;
+  plan.name = top.has("name") ? top["name"].string() : std::filesystem::path(source.file).stem().string();
+  if (top.has("timing")) plan.timing = read_timing(top["timing"]);
+  if (top.has("verdict")) plan.levels = read_levels(top["verdict"]);
+  std::uint64_t own_seed = 1;
+  if (top.has("seed")) own_seed = top["seed"].unsigned_integer(0, std::numeric_limits<std::uint64_t>::max());
+  std::vector<std::string>& experiments = plan.experiments;
+  std::map<std::vector<std::string>, std::vector<std::size_t>> of_labels;
+  for (const Place& entry : top["experiments"].elements()) {
+    for (Draft& draft : read_experiment(entry, seed.value_or(own_seed))) {
+      std::vector<std::size_t>& alike = of_labels[{draft.cell.experiment, draft.estimator->label, draft.medium->label,
+                                                   draft.majorant->label, draft.rays->label}];
+      const auto same = [&](std::size_t other) { return same_statistics(draft, plan.cells[other]); };
+      if (std::any_of(alike.begin(), alike.end(), same)) continue;
+      alike.push_back(plan.cells.size());
+      plan.cells.push_back(std::move(draft));
+    }
+    const std::string name = entry["name"].string();
+    if (std::find(experiments.begin(), experiments.end(), name) != experiments.end())
+      entry["name"].fail(fmt::format("\"{}\" is the name of an earlier experiment; expected another", name));
+    experiments.push_back(name);
+  }
+  if (plan.cells.empty()) top["experiments"].expected("at least one experiment");
+  if (top.has("credits")) {
+    top["credits"].expect_object();
+    for (const auto& [name, text] : top["credits"].json().items()) plan.credits[name] = top["credits"][name].string();
+  }
+  return plan;
+}
+
+/// Puts the configuration's name in front of experiments whose names occur in other files too.
+void tell_experiments_apart(std::vector<DraftPlan>& files) {
+  std::map<std::string, std::set<std::size_t>> owners;
+  for (std::size_t i = 0; i < files.size(); ++i)
+    for (const Draft& draft : files[i].cells) owners[draft.cell.experiment].insert(i);
+  std::map<std::string, std::size_t> taken;
+  for (std::size_t i = 0; i < files.size(); ++i)
+    for (Draft& draft : files[i].cells) {
+      std::string& name = draft.cell.experiment;
+      if (owners[name].size() > 1) name = fmt::format("{}.{}", files[i].name, name);
+      if (const auto [at, added] = taken.emplace(name, i); !added && at->second != i)
+        throw InputError(
+            fmt::format("{}: experiment \"{}\" stands in {} as well; expected another \"name\" of the file or experiment",
+                        files[i].file, name, files[at->second].file));
+    }
+}
+
+/// Short enough for a heading.
+std::string joint_name(const std::vector<DraftPlan>& files) {
+  std::string name = files[0].name;
+  if (files.size() > 3) return fmt::format("{} and {} more", name, files.size() - 1);
+  for (std::size_t i = 1; i < files.size(); ++i) name += fmt::format("+{}", files[i].name);
+  return name;
+}
+
+}  // namespace
+
+Plan read_config(const std::string& text, const std::string& file, std::optional<std::uint64_t> seed) {
+  return read_configs({{text, file}}, seed);
+}
+
+Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::uint64_t> seed) {
+  std::vector<DraftPlan> files;
+  files.reserve(sources.size());
+  for (const ConfigSource& source : sources) files.push_back(read_file(source, seed));
+  if (files.empty()) throw InputError("found no configuration; expected at least one file");
+  tell_experiments_apart(files);
+
+  Plan plan;
+  plan.timing = files.front().timing;
+  plan.levels = files.front().levels;
+  plan.name = joint_name(files);
+  PlanBuilder builder(plan);
+  for (const DraftPlan& file : files) {
+    if (!agree(file.timing, plan.timing))
+      throw InputError(fmt::format("{}: /timing: differs from that of {}; expected the same, or run the files one by one",
+                                   file.file, files.front().file));
+    if (!(file.levels == plan.levels))
+      throw InputError(fmt::format("{}: /verdict: differs from that of {}; expected the same, or run the files one by one",
+                                   file.file, files.front().file));
+    for (const Draft& draft : file.cells) builder.add(draft);
+    plan.credits.insert(file.credits.begin(), file.credits.end());
+  }
+  name_cells(plan);
+  std::size_t first = 0;
+  for (const DraftPlan& file : files) {
+    const Place top(file.json, file.file);
+    const CellPatterns finder(plan, first, file.cells, file.experiments);
+    if (top.has("tables"))
+      for (Table& table : read_tables(top["tables"], finder)) plan.tables.push_back(std::move(table));
+    if (top.has("claims")) read_claims(top["claims"], finder, plan.claims);
+    first += file.cells.size();
+  }
+  plan.config_text = applied_config(plan);
+  return plan;
+}
+
+std::vector<ConfigSource> load_configs(const std::vector<std::string>& paths) {
+  namespace fs = std::filesystem;
+  const auto all = [](std::istream& in) { return std::string(std::istreambuf_iterator<char>(in), {}); };
+  std::vector<ConfigSource> sources;
+  const auto load = [&](const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    if (!in)
+      throw InputError(path.string() + (fs::exists(path) ? ": cannot be read; expected a configuration file" : ": no such file"));
+    sources.push_back({all(in), path.string()});
+  };
+  for (const std::string& path : paths) {
+    if (path == "-") {
+      sources.push_back({all(std::cin), "<stdin>"});
+    } else if (fs::is_directory(path)) {
+      std::vector<fs::path> files;
+      for (const auto& entry : fs::directory_iterator(path))
+        if (entry.path().extension() == ".json" && entry.is_regular_file()) files.push_back(entry.path());
+      if (files.empty()) throw InputError(path + ": found no *.json; expected configuration files");
+      std::sort(files.begin(), files.end());
+      for (const fs::path& file : files) load(file);
+    } else {
+      load(path);
+    }
+  }
+  return sources;
+}
+
+}  // namespace nullmark

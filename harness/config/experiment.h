@@ -1,0 +1,38 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/io/json_input.h"
+#include "harness/model/plan.h"
+
+namespace nullmark {
+
+/// A cell while its experiment is expanded: specifications in place of indices.
+struct Draft {
+  std::string experiment;  ///< as the file calls it
+  std::optional<Component> estimator, rays;
+  std::optional<MediumSpec> medium;
+  std::optional<Component> majorant;
+  bool has_samples = false;
+  Cell cell;
+};
+
+/// Whether a pattern, a partial cell, fits a draft.
+using Test = std::function<bool(const Draft&)>;
+
+/// Keys by which cells of an experiment differ.
+const std::vector<std::string>& axes();
+
+/// A partial cell; all keys that are given must match.  Keys in `also` are someone else's.
+Test read_pattern(const Place& place, const std::vector<std::string>& also = {});
+
+/// Whether two drafts agree on an axis.
+bool agree_on(const std::string& axis, const Draft& a, const Draft& b);
+
+/// The cells of an experiment (format: config.md).  `seed` is that of cells that name none.
+std::vector<Draft> read_experiment(const Place& place, std::uint64_t seed);
+
+}  // namespace nullmark

@@ -1,0 +1,140 @@
+#include "harness/io/file_io.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <boost/iostreams/device/array.hpp>
+#include <boost/iostreams/filter/gzip.hpp>
+#include <boost/iostreams/filtering_stream.hpp>
+#include <cerrno>
+#include <charconv>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <vector>
+
+#include "harness/io/json_input.h"
+
+namespace nullmark {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void fail(const std::string& path, const char* action) {
+  throw InputError(fmt::format("{}: cannot be {}: {}; give a path in a folder that is there and can be written", path, action,
+                               std::strerror(errno)));
+}
+
+constexpr const char* kTemporary = ".tmp";
+
+/// Where the path leads: links to results stay links.
+fs::path target_of(const std::string& path) {
+  std::error_code error;
+  const fs::path target = fs::canonical(path, error);
+  return error ? fs::path(path) : target;
+}
+
+/// A renamed file survives a power cut only once its directory has reached the disk.
+void sync_directory(const fs::path& directory) {
+  const int file = ::open(directory.empty() ? "." : directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) return;
+  ::fsync(file);
+  ::close(file);
+}
+
+std::string unpacked(const std::string& packed, const std::string& path) {
+  constexpr std::size_t kMost = std::size_t{1} << 30;
+  namespace io = boost::iostreams;
+  io::filtering_istream stream;
+  stream.push(io::gzip_decompressor());
+  stream.push(io::array_source(packed.data(), packed.size()));
+  // Otherwise what is damaged would only look shorter.
+  stream.exceptions(std::ios::badbit);
+  std::string text;
+  std::vector<char> part(std::size_t{1} << 20);
+  try {
+    while (stream.read(part.data(), static_cast<std::streamsize>(part.size())) || stream.gcount() > 0) {
+      text.append(part.data(), static_cast<std::size_t>(stream.gcount()));
+      if (text.size() > kMost) throw InputError(path + ": unpacks to more than 1 GiB; expected results of nullmark");
+    }
+  } catch (const io::gzip_error&) {
+    throw InputError(path + ": is packed by gzip, but damaged; copy it again");
+  } catch (const std::ios_base::failure&) {
+    throw InputError(path + ": is packed by gzip, but damaged; copy it again");
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string read_file(const std::string& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) throw InputError(path + ": is a folder; expected a file");
+  std::ifstream in(path, std::ios::binary);
+  if (const int reason = errno; !in)
+    throw InputError(reason == ENOENT ? path + ": no such file"
+                                      : fmt::format("{}: cannot be read: {}; expected a file", path, std::strerror(reason)));
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path) : text;
+}
+
+void write_durably(int file, const std::string& text, const std::string& path) {
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t written = ::write(file, text.data() + done, text.size() - done);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail(path, "written");
+    done += static_cast<std::size_t>(written);
+  }
+  // Pipes and devices know no fsync.
+  if (::fsync(file) != 0 && errno != EINVAL && errno != EROFS) fail(path, "written");
+}
+
+void write_atomically(const std::string& path, const std::string& text) {
+  expect_replaceable(path);
+  const fs::path target = target_of(path);
+  const std::string temporary = fmt::format("{}.{}{}", target.string(), ::getpid(), kTemporary);
+  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (file < 0) fail(path, "written");
+  try {
+    write_durably(file, text, path);
+  } catch (...) {
+    ::close(file);
+    ::unlink(temporary.c_str());
+    throw;
+  }
+  ::close(file);
+  if (std::rename(temporary.c_str(), target.c_str()) != 0) {
+    ::unlink(temporary.c_str());
+    fail(path, "written");
+  }
+  sync_directory(target.parent_path());
+}
+
+void expect_replaceable(const std::string& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::exists(status) && !fs::is_regular_file(status))
+    throw InputError(path + ": is no regular file; expected the path of a file, or - for standard output");
+}
+
+void remove_leftovers(const std::string& path) {
+  const fs::path target = target_of(path);
+  const std::string prefix = target.filename().string() + ".";
+  std::error_code error;
+  for (const fs::directory_entry& entry :
+       fs::directory_iterator(target.has_parent_path() ? target.parent_path() : fs::path("."), error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.rfind(prefix, 0) != 0 || entry.path().extension() != kTemporary) continue;
+    pid_t owner = 0;
+    const char* const end = name.data() + name.size() - std::strlen(kTemporary);
+    if (std::from_chars(name.data() + prefix.size(), end, owner).ptr != end || owner <= 0) continue;
+    if (::kill(owner, 0) != 0 && errno == ESRCH) fs::remove(entry.path(), error);
+  }
+}
+
+}  // namespace nullmark

@@ -1,0 +1,135 @@
+#include "harness/io/spec_json.h"
+
+#include <fmt/format.h>
+
+#include "harness/io/claims_json.h"
+#include "harness/io/tables_json.h"
+#include "harness/io/transport_json.h"
+#include "harness/model/hash.h"
+#include "harness/model/names.h"
+
+namespace nullmark {
+namespace {
+
+std::string hexadecimal(std::uint64_t hash) { return fmt::format("{:016x}", hash); }
+
+void add_samples(Json& json, const Cell& cell) {
+  if (cell.equal_lookups)
+    json["equal_lookups"] = *cell.equal_lookups;
+  else
+    json["samples_per_ray"] = cell.samples_per_ray;
+}
+
+/// The keys that decide the statistics.
+Json deciding_json(const Plan& plan, const Cell& cell) {
+  Json json = {{"estimator", component_json(cell.estimator)},
+               {"medium", medium_json(plan.media[cell.medium])},
+               {"majorant", component_json(plan.majorants[cell.majorant])},
+               {"rays", component_json(plan.ray_sets[cell.rays])},
+               {"quantity", to_string(cell.quantity)},
+               {"measurement", measurement_json(cell.measurement)}};
+  if (cell.transport != TransportSpec{}) json["transport"] = transport_json(cell.transport);
+  if (cell.precision != Precision::float64) json["precision"] = to_string(cell.precision);
+  add_samples(json, cell);
+  json["seed"] = cell.seed;
+  json["own_streams"] = cell.own_streams;
+  return json;
+}
+
+}  // namespace
+
+Json parameters_json(const ParameterValues& values) {
+  Json json = Json::object();
+  for (const auto& [name, value] : values) std::visit([&, &key = name](const auto& held) { json[key] = held; }, value);
+  return json;
+}
+
+Json component_json(const Component& component) {
+  Json json = {{"type", component.type}};
+  json.update(parameters_json(component.values));
+  return json;
+}
+
+Json medium_json(const MediumSpec& medium) {
+  Json json = component_json(medium.field);
+  if (!medium.spectrum.empty()) json["spectrum"] = medium.spectrum;
+  for (const MediumSpec& channel : medium.per_channel) json["media"].push_back(medium_json(channel));
+  add_matter(json, medium);
+  return json;
+}
+
+void add_matter(Json& json, const MediumSpec& medium) {
+  if (!medium.albedo.empty()) json["albedo"] = medium.albedo;
+  if (medium.anisotropy != 0) json["anisotropy"] = medium.anisotropy;
+  if (medium.emission.empty()) return;
+  json["emission"] = {{"radiance", medium.emission}};
+  if (!medium.emission_field.empty()) json["emission"]["field"] = medium_json(medium.emission_field[0]);
+}
+
+Json reference_json(const GivenReference& reference) {
+  return {{"value", reference.value}, {"error", reference.error}, {"source", reference.source}};
+}
+
+Json measurement_json(const Measurement& measurement) {
+  return {{"clamp", measurement.clamp}, {"quantise_bits", measurement.quantise_bits}};
+}
+
+const std::vector<std::string>& law_policies() {
+  static const std::vector<std::string> kNames = {"undecided", "always", "never"};
+  return kNames;
+}
+
+const std::vector<std::string>& tolerances() {
+  static const std::vector<std::string> kNames = {"nothing", "epsilon"};
+  return kNames;
+}
+
+const std::vector<std::string>& sample_policies() {
+  static const std::vector<std::string> kNames = {"planned", "all"};
+  return kNames;
+}
+
+Json gate_json(const GateSpec& gate) {
+  Json json = {{"enabled", gate.enabled}, {"max_samples_per_ray", gate.max_samples_per_ray}};
+  json["laws"] = law_policies()[static_cast<std::size_t>(gate.laws)];
+  if (gate.tolerate != Tolerate::nothing) json["tolerate"] = tolerances()[static_cast<std::size_t>(gate.tolerate)];
+  if (gate.all_samples) json["samples"] = sample_policies()[1];
+  if (gate.epsilon) json["epsilon"] = *gate.epsilon;
+  if (gate.max_lookups_per_ray) json["max_lookups_per_ray"] = *gate.max_lookups_per_ray;
+  return json;
+}
+
+std::string cell_id(const Plan& plan, const Cell& cell) { return hexadecimal(fnv1a(deciding_json(plan, cell).dump())); }
+
+std::string applied_config(const Plan& plan) {
+  Json experiments = Json::array();
+  for (const Cell& cell : plan.cells) {
+    if (experiments.empty() || experiments.back()["name"] != cell.experiment)
+      experiments.push_back({{"name", cell.experiment}, {"include", Json::array()}});
+    Json entry = deciding_json(plan, cell);
+    if (plan.media[cell.medium].optional) entry["medium"]["optional"] = true;
+    entry["images"] = cell.images;
+    entry["image_maximum"] = cell.image_maximum;
+    entry["gate"] = gate_json(cell.gate);
+    if (cell.reference) entry["reference"] = reference_json(*cell.reference);
+    experiments.back()["include"].push_back(std::move(entry));
+  }
+  const std::vector<std::uint64_t>& batches = plan.timing.samples_per_traversal;
+  Json json = {{"$schema", kConfigSchema},
+               {"name", plan.name},
+               {"timing",
+                {{"enabled", plan.timing.enabled},
+                 {"repetitions", plan.timing.repetitions},
+                 {"seconds", plan.timing.seconds},
+                 {"samples_per_traversal", batches.size() == 1 ? Json(batches[0]) : Json(batches)}}},
+               {"verdict", {{"alpha", plan.levels.alpha}, {"alpha_pass", plan.levels.alpha_pass}}},
+               {"experiments", std::move(experiments)},
+               {"tables", tables_json(plan.tables)}};
+  if (!plan.claims.empty()) json["claims"] = claims_json(plan.claims);
+  if (!plan.credits.empty()) json["credits"] = plan.credits;
+  return json.dump();
+}
+
+std::string config_hash(const std::string& config_text) { return hexadecimal(fnv1a(config_text)); }
+
+}  // namespace nullmark

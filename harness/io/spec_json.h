@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+
+#include "harness/io/json_input.h"
+#include "harness/model/plan.h"
+#include "harness/registry/components.h"
+
+namespace nullmark {
+
+inline constexpr const char* kConfigSchema = "nullmark/config/1";
+
+/// Parts of a plan as a configuration writes them, complete: every parameter stands there.
+Json parameters_json(const ParameterValues& values);
+Json component_json(const Component& component);
+Json medium_json(const MediumSpec& medium);
+/// Adds what a medium does to light beside removing it: albedo, anisotropy, emission.
+void add_matter(Json& json, const MediumSpec& medium);
+Json reference_json(const GivenReference& reference);
+Json measurement_json(const Measurement& measurement);
+/// In the order of LawPolicy.
+const std::vector<std::string>& law_policies();
+const std::vector<std::string>& tolerances();
+const std::vector<std::string>& sample_policies();
+Json gate_json(const GateSpec& gate);
+
+/// What decides a cell's statistics, as canonical text, hashed to 16 hexadecimal digits.
+std::string cell_id(const Plan& plan, const Cell& cell);
+
+/// The plan as a configuration that names every cell explicitly; reading it gives the same plan.  One line, canonical.
+std::string applied_config(const Plan& plan);
+
+/// 16 hexadecimal digits; equal for equal plans.
+std::string config_hash(const std::string& config_text);
+
+}  // namespace nullmark

@@ -1,0 +1,68 @@
+#include "harness/io/tables_json.h"
+
+#include "harness/model/metrics.h"
+
+namespace nullmark {
+
+Json tables_json(const std::vector<Table>& tables) {
+  Json list = Json::array();
+  for (const Table& table : tables) {
+    Json rows = Json::array();
+    for (const TableRow& row : table.rows) {
+      Json entry = {{"label", row.label}, {"given", Json::object()}, {"cells", Json::object()}};
+      for (const auto& [heading, number] : row.given) entry["given"][heading] = number;
+      for (const auto& [heading, cell] : row.cells) entry["cells"][heading] = {{"cell", cell}};
+      if (row.theory_of) entry["theory"] = {{"cell", *row.theory_of}};
+      if (row.relative_to) entry["relative_to"] = {{"cell", *row.relative_to}};
+      if (row.tolerance) entry["tolerance"] = *row.tolerance;
+      if (!row.note.empty()) entry["note"] = row.note;
+      rows.push_back(std::move(entry));
+    }
+    list.push_back({{"title", table.title}, {"metric", table.metric}, {"rows", std::move(rows)}});
+  }
+  return list;
+}
+
+namespace {
+
+TableRow read_row(const Place& place, const CellReader& finder) {
+  place.expect_keys({"label", "given", "cells", "theory", "note", "relative_to", "tolerance"});
+  TableRow row;
+  row.label = place["label"].string();
+  if (place.has("note")) row.note = place["note"].string();
+  if (place.has("given")) {
+    place["given"].expect_object();
+    for (const auto& [heading, json] : place["given"].json().items())
+      row.given.emplace_back(heading, place["given"][heading].number());
+  }
+  if (place.has("cells")) {
+    place["cells"].expect_object();
+    for (const auto& [heading, json] : place["cells"].json().items())
+      row.cells.emplace_back(heading, finder.one(place["cells"][heading]));
+  }
+  if (place.has("theory")) row.theory_of = finder.one(place["theory"]);
+  if (place.has("relative_to")) row.relative_to = finder.one(place["relative_to"]);
+  if (place.has("tolerance")) {
+    row.tolerance = place["tolerance"].positive();
+    if (row.given.empty() || row.cells.empty())
+      place["tolerance"].fail("needs \"given\" and \"cells\" beside it, which it compares");
+  }
+  return row;
+}
+
+}  // namespace
+
+std::vector<Table> read_tables(const Place& place, const CellReader& finder) {
+  std::vector<Table> tables;
+  for (const Place& entry : place.elements()) {
+    entry.expect_keys({"title", "metric", "rows"});
+    Table table;
+    table.title = entry["title"].string();
+    if (entry.has("metric")) table.metric = entry["metric"].one_of(metric_names(), "metric");
+    for (const Place& row : entry["rows"].elements()) table.rows.push_back(read_row(row, finder));
+    tables.push_back(std::move(table));
+  }
+  return tables;
+}
+
+}  // namespace nullmark

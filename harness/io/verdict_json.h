@@ -1,0 +1,13 @@
+#pragma once
+
+#include "harness/io/json_input.h"
+#include "harness/model/record.h"
+
+namespace nullmark {
+
+Json verdict_json(const VerdictRecord& verdict);
+
+/// Throws InputError.
+VerdictRecord read_verdict(const Place& place);
+
+}  // namespace nullmark

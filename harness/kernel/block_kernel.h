@@ -1,0 +1,337 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <type_traits>
+
+#include "harness/kernel/kernel.h"
+#include "harness/kernel/walker.h"
+#include "media/base/elementary.h"
+#include "media/base/inversion.h"
+
+namespace nullmark {
+
+/// The loop that runs an estimator.  A block of walks of one ray steps together: all propose, the medium answers all points in
+/// one indirect call, all consume, the finished leave.  So there is one kernel per estimator and one per medium instead of one
+/// per pair, and the loop alone counts, audits the majorant and hands out random streams.
+template <template <class> class Estimator, class Value>
+class BlockKernel : public Kernel {
+  using E = Estimator<Value>;
+  using Ray = typename detail::RayOf<E, Value>::type;
+  using Walk = typename E::Walk;
+
+  static constexpr std::size_t kBlock = 256;
+
+ protected:
+  /// A walk this long is reported as an error instead of running on: nothing may hang, and nothing may be cut short in silence.
+  static constexpr std::uint32_t kStepsBetweenStops = 1u << 14;
+
+  struct State : Workspace {
+    Ray ray;
+    std::array<Walk, kBlock> walk;
+    std::array<Flight, kBlock> flight;
+    std::array<Rng, kBlock> rng;
+    std::array<std::uint32_t, kBlock> active;
+    std::array<Real, kBlock> x, y, z, ahead{};
+    std::array<Real, kBlock*(std::is_same_v<Value, Real> ? 1 : kMaxChannels)> extinction;
+    std::vector<std::uint32_t> marked;  ///< of a profile, per walk: marks told
+  };
+
+ private:
+  static constexpr bool kSamplesEvents = requires(const E& e, const Walk& walk, const Ray& ray, const Flight& at) {
+    e.event(walk, ray, at);
+  };
+  static constexpr bool kTellsProfile = requires(const E& e, const Walk& walk, const Ray& ray) {
+    e.transmittance_at(walk, ray, Real{0});
+  };
+
+ public:
+  BlockKernel(const E& estimator, int channels) : estimator_(estimator), channels_(channels) {}
+
+  bool needs_optical_depth() const override {
+    if constexpr (requires { E::kNeedsOpticalDepth; }) return E::kNeedsOpticalDepth;
+    if constexpr (requires { estimator_.needs_optical_depth(); }) return estimator_.needs_optical_depth();
+    return false;
+  }
+
+  bool needs_knots() const override {
+    if constexpr (requires { E::kNeedsKnots; }) return E::kNeedsKnots;
+    return false;
+  }
+
+  bool states_theory() const override {
+    return requires(const E& e, const Ray& ray, const RayProfile& profile) {
+      e.theory(ray, profile, 0, Quantity::transmittance);
+    };
+  }
+
+  bool answers(Quantity quantity) const override {
+    constexpr bool depth = requires(const E& e, const Walk& walk, const Ray& ray) { e.optical_depth(walk, ray); };
+    if (quantity == Quantity::optical_depth) return depth;
+    if (quantity == Quantity::transmittance_profile) return kTellsProfile && flies();
+    if (quantity == Quantity::free_path) {
+      if constexpr (requires { estimator_.samples_events(channels_); }) return estimator_.samples_events(channels_);
+      return kSamplesEvents;
+    }
+    return quantity == Quantity::transmittance;
+  }
+
+  std::size_t outputs(Quantity quantity, const RayContext& context) const override {
+    const auto channels = static_cast<std::size_t>(channels_);
+    if (quantity == Quantity::transmittance_profile) return context.marks.size() * channels;
+    if (quantity == Quantity::free_path) return (kFreePathBins + (scatters(context.albedo) ? 3 : 2)) * channels;
+    return channels;
+  }
+
+  std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
+
+  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const RayContext& context) const override {
+    Ray& ray = static_cast<State&>(workspace).ray;
+    ray.begin = context.world.begin;
+    ray.end = context.world.end;
+    ray.channels = channels_;
+    ray.bounds.segments.assign(context.segments.segments.begin(), context.segments.segments.end());
+    ray.bounds.crossing = context.segments.crossing;
+    ray.medium = extrema;
+    ray.majorant.start(ray.begin, ray.bounds.crossing);
+    for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
+    ray.exact_depth.reset();
+    if (context.exact_depth) ray.exact_depth = load<Value>(context.exact_depth->data(), channels_);
+    ray.knots.assign(context.knots.begin(), context.knots.end());
+    ray.degree = medium.polynomial_degree();
+    ray.entry = context.world.at(context.world.begin);
+    if constexpr (requires { E::kNeedsInversion; })
+      ray.distance_at_depth = [&medium, local = context.local](Real depth) { return distance_at_depth(medium, local, depth); };
+    if constexpr (requires { E::kNeedsShares; }) detail::prepare_shares(ray, medium, context.local);
+    ray.albedo = context.albedo.size() > 0 ? load<Value>(context.albedo.data(), channels_) : ray.value(0);
+    ray.throughput = ray.value(1);
+    if constexpr (requires { estimator_.prepare(ray); }) estimator_.prepare(ray);
+  }
+
+  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+              std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
+    State& state = static_cast<State&>(workspace);
+    const std::size_t outputs = this->outputs(quantity, context);
+    out.values.resize(count * outputs);
+    out.lookups.assign(count, 0);
+    counters.samples += count;
+    for (std::size_t done = 0; done < count; done += kBlock) {
+      const auto run = state.recording ? &BlockKernel::run_block<true> : &BlockKernel::run_block<false>;
+      (this->*run)(state, medium, context, key, first + done, std::min(kBlock, count - done), quantity,
+                   &out.values[done * outputs], &out.lookups[done], counters);
+    }
+  }
+
+  bool flies() const override {
+    constexpr bool by_another_law = requires { E::kIgnoresMajorant; }
+    || requires { E::kOwnFlights; };
+    if constexpr (requires { estimator_.flies_once(channels_); }) return !by_another_law && estimator_.flies_once(channels_);
+    return !by_another_law;
+  }
+
+  bool states_count_law() const override {
+    return requires(const E& e, const Ray& ray, const RayProfile& profile) { e.count_law(ray, profile, 0); };
+  }
+
+  std::vector<CountLaw> count_law(const Workspace& workspace, const RayProfile& profile) const override {
+    std::vector<CountLaw> laws;
+    if constexpr (requires(Ray r) { estimator_.count_law(r, profile, 0); }) {
+      const Ray& ray = static_cast<const State&>(workspace).ray;
+      for (int c = 0; c < channels_; ++c) laws.push_back(estimator_.count_law(ray, profile, c));
+    }
+    return laws;
+  }
+
+  Spectrum expected(const Workspace& workspace, const Spectrum& optical_depth, Quantity quantity) const override {
+    if constexpr (requires(Value v, Ray r) { estimator_.expected(v, r); }) {
+      const Value depth = load<Value>(optical_depth.data(), channels_);
+      Spectrum result(channels_);
+      store(estimator_.expected(depth, static_cast<const State&>(workspace).ray), result.data());
+      return result;
+    }
+    return quantity == Quantity::transmittance ? Spectrum((-optical_depth).exp()) : optical_depth;
+  }
+
+  std::vector<Theory> theory(const Workspace& workspace, const RayProfile& profile, Quantity quantity) const override {
+    std::vector<Theory> result(static_cast<std::size_t>(channels_));
+    if constexpr (requires(Ray r) { estimator_.theory(r, profile, 0, quantity); }) {
+      const Ray& ray = static_cast<const State&>(workspace).ray;
+      for (int c = 0; c < channels_; ++c) {
+        Theory& theory = result[static_cast<std::size_t>(c)];
+        theory = estimator_.theory(ray, profile, c, quantity);
+        if (quantity == Quantity::free_path || quantity == Quantity::transmittance_profile) theory.mean = theory.variance = {};
+        if constexpr (requires(Ray r) { estimator_.weight_theory(r, profile, 0); })
+          if (quantity == Quantity::free_path) theory = estimator_.weight_theory(ray, profile, c);
+      }
+    }
+    return result;
+  }
+
+ private:
+  template <bool recorded>
+  void run_block(State& state, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+                 std::size_t count, Quantity quantity, Real* values, std::uint32_t* lookups, Counters& counters) const {
+    const Ray& ray = state.ray;
+    const auto channels = static_cast<std::size_t>(channels_);
+    const std::size_t outputs = this->outputs(quantity, context);
+    const bool profile = quantity == Quantity::transmittance_profile;
+    if (profile) state.marked.assign(count, 0);
+    for (std::size_t k = 0; k < count; ++k) {
+      state.rng[k] = Rng(SampleAddress{key, context.index, first + k});
+      state.flight[k].start(ray.majorant);
+      estimator_.init(state.walk[k], ray, state.flight[k], state.rng[k]);
+      state.active[k] = static_cast<std::uint32_t>(k);
+    }
+    std::size_t recorded_before = 0;
+    if constexpr (recorded) {
+      recorded_before = state.recording->walks.size();
+      state.recording->add(count);
+    }
+    const Vec3 origin = context.local.origin, direction = context.local.direction;
+    std::size_t active = count;
+    for (std::uint32_t step = 1; active > 0; ++step) {
+      if (step % kStepsBetweenStops == 0 && state.stop()) return;
+      draw_ahead(state, active);
+      std::size_t kept = 0;
+      for (std::size_t a = 0; a < active; ++a) {
+        const std::uint32_t k = state.active[a];
+        Flight& flight = state.flight[k];
+        const bool goes_on = estimator_.propose(state.walk[k], ray, flight, state.rng[k]);
+        if (profile) mark(state, ray, k, goes_on ? flight.position() : kInfinity, context.marks, values + k * outputs);
+        if (goes_on) {
+          const Real t = flight.position();
+          state.x[kept] = origin.x() + t * direction.x();
+          state.y[kept] = origin.y() + t * direction.y();
+          state.z[kept] = origin.z() + t * direction.z();
+          state.active[kept++] = k;
+        } else {
+          finish(state, ray, k, quantity, context, values + k * outputs);
+          if constexpr (recorded) {
+            Recording::Walk& walk = state.recording->walks[recorded_before + k];
+            walk.depth = flight.depth();
+            walk.total_depth = flight.depth() + flight.depth_left();
+            walk.draws = state.rng[k].draws();
+            walk.collisions = flight.collisions();
+            if constexpr (kSamplesEvents) {
+              const Event<Value> event = estimator_.event(state.walk[k], ray, state.flight[k]);
+              walk.end = event.kind;
+              walk.distance = event.distance;
+            }
+          }
+          counters.draws += state.rng[k].draws();
+          counters.lookups += lookups[k];
+          counters.null_collisions += null_collisions(state.walk[k], ray, lookups[k]);
+        }
+      }
+      active = kept;
+      if (active == 0) break;
+      look_up(state, medium, active);
+      for (std::size_t a = 0; a < active; ++a) {
+        const std::uint32_t k = state.active[a];
+        const Value extinction = load<Value>(&state.extinction[a * channels], channels_);
+        if constexpr (recorded) {
+          Recording::Walk& walk = state.recording->walks[recorded_before + k];
+          const Flight& at = state.flight[k];
+          walk.steps.push_back({at.position(), at.depth(), flies() ? at.rate() : 0, 0});
+          walk.extinction.insert(walk.extinction.end(), &state.extinction[a * channels],
+                                 &state.extinction[a * channels] + channels);
+        }
+        audit(ray, state.flight[k], extinction, counters);
+        estimator_.consume(state.walk[k], ray, state.flight[k], extinction, state.rng[k]);
+        if constexpr (recorded) state.recording->walks[recorded_before + k].steps.back().draws = state.rng[k].draws();
+        if (++lookups[k] == state.most_lookups) {
+          ++counters.overruns;
+          active = 0;
+        }
+      }
+    }
+  }
+
+  void look_up(State& state, const Medium& medium, std::size_t active) const {
+    if constexpr (requires { E::kNeedsShares; }) {
+      for (std::size_t a = 0; a < active; ++a) {
+        const std::uint32_t k = state.active[a];
+        const int component = estimator_.component(state.walk[k]);
+        state.extinction[a] = medium.component_extinction(component, {state.x[a], state.y[a], state.z[a]}) /
+                              state.ray.shares[state.flight[k].piece()][component];
+      }
+    } else {
+      medium.extinction({state.x.data(), state.y.data(), state.z.data(), active}, state.extinction.data());
+    }
+  }
+
+  /// Most walks draw an exponential next; their logarithms are taken together.
+  static void draw_ahead(State& state, std::size_t active) {
+    if constexpr (
+        requires { E::kIgnoresMajorant; } || requires { E::kOwnFlights; })
+      return;
+    for (std::size_t a = 0; a < active; ++a) state.ahead[a] = state.rng[state.active[a]].peek();
+    negative_logarithms(state.ahead.data(), active, state.ahead.data());
+    for (std::size_t a = 0; a < active; ++a) state.rng[state.active[a]].make_ready(state.ahead[a]);
+  }
+
+  /// Tells the profile's marks that the walk has passed before its next collision at `reached`.
+  void mark(State& state, const Ray& ray, std::uint32_t k, Real reached, std::span<const Real> marks, Real* values) const {
+    if constexpr (kTellsProfile) {
+      std::uint32_t& marked = state.marked[k];
+      for (; marked < marks.size() && marks[marked] < reached; ++marked)
+        store(estimator_.transmittance_at(state.walk[k], ray, marks[marked]),
+              values + marked * static_cast<std::size_t>(channels_));
+    }
+  }
+
+  /// Scores of a free path: its weight in the bin of its collision, where it scatters, where it escapes, and wherever it ends.
+  void score(State& state, const Ray& ray, std::uint32_t k, const RayContext& context, Real* values) const {
+    if constexpr (kSamplesEvents) {
+      const Event<Value> event = estimator_.event(state.walk[k], ray, state.flight[k]);
+      const auto channels = static_cast<std::size_t>(channels_);
+      std::fill(values, values + outputs(Quantity::free_path, context), Real{0});
+      Real* const scattered = values + kFreePathBins * channels;
+      Real* const escaped = scattered + (scatters(context.albedo) ? channels : 0);
+      store(event.weight, escaped + channels);
+      if (event.kind == EventKind::escape) store(event.weight, escaped);
+      if (!is_collision(event.kind)) return;
+      const auto after = std::upper_bound(context.marks.begin(), context.marks.end(), event.distance);
+      const auto cell = std::clamp<std::ptrdiff_t>(after - context.marks.begin() - 1, 0, kFreePathCells - 1);
+      store(event.weight, values + static_cast<std::size_t>(cell) / (kFreePathCells / kFreePathBins) * channels);
+      if (!scatters(context.albedo)) return;
+      // Samplers that leave the kind open are grey.
+      const bool scatter = event.kind == EventKind::scatter ||
+                           (event.kind == EventKind::collision && state.rng[k].uniform() < channel(ray.albedo, 0));
+      if (scatter) store(event.weight, scattered);
+    }
+  }
+
+  void finish(State& state, const Ray& ray, std::uint32_t k, Quantity quantity, const RayContext& context, Real* values) const {
+    if (quantity == Quantity::transmittance_profile) return;
+    if (quantity == Quantity::free_path) return score(state, ray, k, context, values);
+    if constexpr (requires(Walk w) { estimator_.optical_depth(w, ray); }) {
+      if (quantity == Quantity::optical_depth) {
+        store(estimator_.optical_depth(state.walk[k], ray), values);
+        return;
+      }
+    }
+    store(estimator_.result(state.walk[k], ray), values);
+  }
+
+  std::uint64_t null_collisions(const Walk& walk, const Ray& ray, std::uint32_t lookups) const {
+    if constexpr (requires { E::kIgnoresMajorant; }) return 0;
+    if constexpr (requires { estimator_.real_collisions(walk, ray); })
+      return lookups - static_cast<std::uint64_t>(estimator_.real_collisions(walk, ray));
+    return lookups;
+  }
+
+  void audit(const Ray& ray, const Flight& at, const Value& extinction, Counters& counters) const {
+    if constexpr (requires { E::kIgnoresMajorant; }) return;
+    const Real bound = ray.majorant.rate(at.piece()), most = largest(extinction);
+    if (exceeds(most, bound)) {
+      ++counters.violations;
+      counters.largest_violation = std::max(counters.largest_violation, most / bound);
+    }
+  }
+
+  E estimator_;
+  int channels_;
+};
+
+}  // namespace nullmark

@@ -1,0 +1,309 @@
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+
+#include "estimators/walk/lane_flight.h"
+#include "harness/kernel/block_kernel.h"
+
+namespace nullmark {
+
+/// Visits the n members of an aggregate in their order.
+template <std::size_t n, class Aggregate, class Visit>
+[[gnu::always_inline]] inline void each_member(Aggregate& x, const Visit& visit) {
+  static_assert(n >= 1 && n <= 4, "a walk in lanes holds one to four numbers");
+  const auto all = [&](auto&... members) __attribute__((always_inline)) { (visit(members), ...); };
+  if constexpr (n == 1) {
+    auto& [a] = x;
+    all(a);
+  } else if constexpr (n == 2) {
+    auto& [a, b] = x;
+    all(a, b);
+  } else if constexpr (n == 3) {
+    auto& [a, b, c] = x;
+    all(a, b, c);
+  } else {
+    auto& [a, b, c, d] = x;
+    all(a, b, c, d);
+  }
+}
+
+/// The loop of BlockKernel with N walks to a register: the same estimator source over Lanes, the same steps, and in double the
+/// same samples bit for bit.  All walks of a block have taken the same number of steps, so a block is lookups done for all;
+/// walks that end leave it, and the others close ranks.  An estimator takes part by `static constexpr bool kLanes = true`, with a
+/// Walk of nothing but Value, Distance<Value> and Truth<Value>, and functions that take ray, flight and stream as auto.
+/// Transmittance and optical depth are answered so; in double the base answers what else there is, in float nothing else is.
+template <template <class> class Estimator, class T, std::size_t N = kNativeLanes<T>>
+class LaneKernel final : public BlockKernel<Estimator, Real> {
+  using Base = BlockKernel<Estimator, Real>;
+  using Pack = Lanes<T, N>;
+  using Mask = LaneMask<T, N>;
+  using Index = LaneIndex<T, N>;
+  using E = Estimator<Pack>;
+  using Course = LaneCourse<T, N>;
+  using Streams = LaneRng<T, N>;
+
+  static constexpr bool kSingle = !std::is_same_v<T, Real>;
+  static constexpr std::size_t kBlock = 2048 / sizeof(T);  ///< walks whose numbers fit the first cache together
+
+  /// N walks: registers of the same lanes throughout, which is how they close ranks.
+  struct Walks {
+    LanePlace<T, N> place;
+    typename E::Walk walk;
+    typename Streams::State stream;
+    Index sample;
+
+    /// Visits every register that a step may change, with its place in the state.
+    template <class Visit>
+    [[gnu::always_inline]] void each_moving(const Visit& visit) {
+      std::size_t n = kPiece;
+      const auto next = [&](auto& lanes) __attribute__((always_inline)) { visit(lanes, n++); };
+      next(place.piece);
+      next(place.depth);
+      next(place.position);
+      each_member<sizeof(walk) / sizeof(Pack)>(walk, next);
+      for (auto& word : stream) next(word);
+    }
+  };
+  static constexpr std::size_t kNumbers = sizeof(Walks) / sizeof(Pack), kSample = 0, kPiece = 1;
+  static constexpr std::size_t kMaskBytes = 8;  ///< as many as a mask may take when it is stored
+
+  struct State final : Base::State {
+    /// [number of a walk][walk]; whole registers may be read at the end.
+    alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock>, kNumbers> numbers{};
+    alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock>, 3> points{};  ///< [axis][walk]
+    alignas(HWY_MAX_BYTES) std::array<T, kBlock> extinction{};
+    alignas(HWY_MAX_BYTES) std::array<T, kBlock> result{}, steps{};  ///< of walks that have ended; steps are the bits of an Index
+    std::array<std::uint8_t, kBlock / N * kMaskBytes> alive{};
+    /// What ranks leave behind when they close; whole registers are written at the end.
+    alignas(HWY_MAX_BYTES) std::array<T, kBlock + N> left_result{}, left_sample{}, left_steps{};
+  };
+
+ public:
+  LaneKernel(const Estimator<Real>& estimator, const E& in_lanes) : Base(estimator, 1), estimator_(in_lanes) {}
+
+  std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
+
+  bool answers(Quantity quantity) const override { return Base::answers(quantity) && (!kSingle || in_lanes(quantity)); }
+
+  bool flies() const override { return !kSingle && Base::flies(); }
+
+  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+              std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
+    State& state = static_cast<State&>(workspace);
+    // One walk would leave all lanes but its own idle.
+    if (!kSingle && (state.recording || !in_lanes(quantity) || count == 1))
+      return Base::sample(workspace, medium, context, key, first, count, quantity, out, counters);
+    out.values.resize(count);
+    out.lookups.resize(count);
+    counters.samples += count;
+    for (std::size_t done = 0; done < count; done += kBlock)
+      Run{*this,   state, medium, context, {key, context.index, first + done}, quantity, &out.values[done], &out.lookups[done],
+          counters}
+          .block(std::min(kBlock, count - done));
+  }
+
+ private:
+  static bool in_lanes(Quantity quantity) { return quantity == Quantity::transmittance || quantity == Quantity::optical_depth; }
+
+  /// What a block adds to the counters.
+  struct Tally {
+    std::uint64_t draws = 0, lookups = 0, real = 0, violations = 0;
+    std::size_t walks = 0;  ///< in the first lanes, those that have ended since ranks were closed included
+    std::size_t dead = 0;   ///< lanes that step in vain
+  };
+
+  /// One block of samples on its way.  What runs once a block is not inlined: the code of a step then does not depend on how much
+  /// else its file holds.
+  struct Run {
+    const LaneKernel& kernel;
+    State& state;
+    const Medium& medium;
+    const RayContext& context;
+    SampleAddress first;
+    Quantity quantity;
+    Real* values;
+    std::uint32_t* lookups;
+    Counters& counters;
+    Course course = {}, majorant = Course(state.ray.majorant);
+    std::array<T, 3> origin = narrowed(context.local.origin), direction = narrowed(context.local.direction);
+
+    static std::array<T, 3> narrowed(const Vec3& v) {
+      return {static_cast<T>(v.x()), static_cast<T>(v.y()), static_cast<T>(v.z())};
+    }
+
+    /// Where the ray does not, its points keep the coordinate that they were given when the block began.
+    bool moves_along(std::size_t axis) const { return direction[axis] != 0; }
+
+    void block(std::size_t count) {
+      Tally tally{.walks = count};
+      std::size_t lanes = (count + N - 1) / N * N;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (!moves_along(axis)) std::fill_n(state.points[axis].begin(), lanes, origin[axis]);
+      for (std::size_t k = 0; k < lanes; k += N) set_out(k, Mask::first(std::min(N, count - k)), tally);
+      lanes = close_ranks(lanes, tally);
+      for (std::uint32_t step = 1; lanes > 0; ++step) {
+        if (step % Base::kStepsBetweenStops == 0 && state.stop()) return;
+        if (step == state.most_lookups) {
+          counters.overruns += lanes - tally.dead;
+          break;
+        }
+        const auto& [x, y, z] = state.points;
+        medium.extinction(BasicPoints<T>{x.data(), y.data(), z.data(), lanes}, state.extinction.data());
+        if (course.has_several())
+          for (std::size_t k = 0; k < lanes; k += N) go_on<true>(k, step, tally);
+        else
+          for (std::size_t k = 0; k < lanes; k += N) go_on<false>(k, step, tally);
+        // Moving walks costs more than idle lanes do, until a quarter of them idles.
+        if (4 * tally.dead >= lanes) lanes = close_ranks(lanes, tally);
+      }
+      counters.draws += tally.draws;
+      counters.lookups += tally.lookups;
+      counters.violations += tally.violations;
+      if constexpr (!requires { E::kIgnoresMajorant; }) counters.null_collisions += tally.lookups - tally.real;
+    }
+
+    [[gnu::noinline]] void set_out(std::size_t k, Mask there, Tally& tally) {
+      Walks walks;
+      walks.stream = Streams::seeded({first.key, first.ray, first.sample + k});
+      walks.sample = Index::counting_from(static_cast<typename Index::Number>(k));
+      LaneFlight<T, N> flight(course, walks.place);
+      Streams rng(walks.stream, there);
+      flight.start(state.ray.majorant);
+      kernel.estimator_.init(walks.walk, state.ray, flight, rng);
+      bits(walks.sample).store(&state.numbers[kSample][k]);
+      propose(k, walks, there, flight, rng, 0, tally);
+      tally.dead += N - count(there);
+    }
+
+    template <bool several>
+    [[gnu::always_inline]] void go_on(std::size_t k, std::uint32_t step, Tally& tally) {
+      const Mask alive = Mask::load(&state.alive[k / N * kMaskBytes]);
+      Walks walks;
+      walks.place.piece = Index(0);
+      walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
+        if (n == kPiece && !several) return;
+        using Number = std::remove_reference_t<decltype(lanes)>;
+        lanes = Number(hn::BitCast(hn::DFromV<decltype(raw(lanes))>(), Pack::load(&state.numbers[n][k]).vector()));
+      });
+      LaneFlight<T, N, several> flight(course, walks.place);
+      Streams rng(walks.stream, alive);
+      const Pack extinction = Pack::load(&state.extinction[k]);
+      audit<several>(flight.piece(), extinction, alive, tally);
+      kernel.estimator_.consume(walks.walk, state.ray, flight, extinction, rng);
+      propose(k, walks, alive, flight, rng, step, tally);
+    }
+
+    /// The walks' next points; those that have none leave their result.
+    template <bool several>
+    [[gnu::always_inline]] void propose(std::size_t k, Walks& walks, Mask alive, LaneFlight<T, N, several>& flight, Streams& rng,
+                                        std::uint32_t step, Tally& tally) {
+      const Mask goes_on = alive & kernel.estimator_.propose(walks.walk, state.ray, flight, rng), ends = alive & !goes_on;
+      tally.draws += rng.draws();
+      tally.dead += count(ends);
+      if constexpr (requires { kernel.estimator_.real_collisions(walks.walk, state.ray); })
+        tally.real += count(ends & kernel.estimator_.real_collisions(walks.walk, state.ray));
+      answer(walks).store(&state.result[k], ends);
+      bits(Index(static_cast<typename Index::Number>(step))).store(&state.steps[k], ends);
+      goes_on.store(&state.alive[k / N * kMaskBytes]);
+      walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
+        if (n == kPiece && !several) return;
+        bits(lanes).store(&state.numbers[n][k]);
+      });
+      const Pack t = walks.place.position;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (moves_along(axis)) (Pack(origin[axis]) + t * Pack(direction[axis])).store(&state.points[axis][k]);
+    }
+
+    Pack answer(const Walks& walks) const {
+      if constexpr (requires { kernel.estimator_.optical_depth(walks.walk, state.ray); })
+        if (quantity == Quantity::optical_depth) return kernel.estimator_.optical_depth(walks.walk, state.ray);
+      return kernel.estimator_.result(walks.walk, state.ray);
+    }
+
+    template <bool several>
+    [[gnu::always_inline]] void audit(Index piece, Pack extinction, Mask alive, Tally& tally) {
+      if constexpr (requires { E::kIgnoresMajorant; }) return;
+      const Pack bound = majorant.template rate<several>(piece);
+      Mask beyond = extinction > bound * Pack(1 + kBoundRounding<T>);
+      if (none(beyond)) return;
+      beyond = beyond & alive;
+      tally.violations += count(beyond);
+      const Pack excess = select(beyond, extinction / bound, Pack(0));
+      T x[N];
+      excess.store(x);
+      counters.largest_violation = std::max<Real>(counters.largest_violation, *std::max_element(x, x + N));
+    }
+
+    /// Hands out what the dead have left and moves the living together; tells how many lanes they take.
+    [[gnu::noinline]] std::size_t close_ranks(std::size_t lanes, Tally& tally) {
+      std::size_t kept = 0, left = 0;
+      for (std::size_t k = 0; k < lanes; k += N) {
+        const Mask alive = Mask::load(&state.alive[k / N * kMaskBytes]);
+        const Mask there = Mask::first(k < tally.walks ? std::min(N, tally.walks - k) : 0), dead = there & !alive;
+        const auto close = [k](const ClosedRanks<T, N>& ranks, const auto& from, auto& to, std::size_t at) {
+          Pack(ranks(Pack::load(&from[k]).vector())).store(&to[at]);
+        };
+        const ClosedRanks<T, N> close_dead(dead), close_living(alive);
+        close(close_dead, state.result, state.left_result, left);
+        close(close_dead, state.steps, state.left_steps, left);
+        close(close_dead, state.numbers[kSample], state.left_sample, left);
+        left += count(dead);
+        for (std::size_t n = 0; n < kNumbers; ++n)
+          if (n != kPiece || course.has_several()) close(close_living, state.numbers[n], state.numbers[n], kept);
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          if (moves_along(axis)) close(close_living, state.points[axis], state.points[axis], kept);
+        kept += count(alive);
+      }
+      for (std::size_t i = 0; i < left; ++i) {
+        const auto sample = static_cast<std::size_t>(std::bit_cast<typename Index::Number>(state.left_sample[i]));
+        values[sample] = state.left_result[i];
+        lookups[sample] = static_cast<std::uint32_t>(std::bit_cast<typename Index::Number>(state.left_steps[i]));
+        tally.lookups += lookups[sample];
+      }
+      lanes = (kept + N - 1) / N * N;
+      for (std::size_t k = 0; k < lanes; k += N) Mask::first(std::min(N, kept - k)).store(&state.alive[k / N * kMaskBytes]);
+      tally.dead = lanes - kept;
+      tally.walks = kept;
+      return lanes;
+    }
+
+    static auto raw(const auto& lanes) {
+      if constexpr (requires { lanes.vector(); })
+        return lanes.vector();
+      else
+        return lanes;
+    }
+
+    /// Any register, as it is kept among the numbers.
+    static Pack bits(const auto& lanes) { return hn::BitCast(typename Pack::Tag(), raw(lanes)); }
+  };
+
+  E estimator_;
+};
+
+/// An estimator over registers of this build's width.
+template <template <class> class Estimator, class T>
+using LanesOf = Estimator<Lanes<T, kNativeLanes<T>>>;
+
+/// Whether all that a walk calls takes lanes.
+template <template <class> class Estimator>
+constexpr bool runs_in_lanes() {
+  if constexpr (requires { Estimator<Real>::kLanes; }) {
+    using E = LanesOf<Estimator, Real>;
+    using Along = typename detail::RayOf<Estimator<Real>, Real>::type;
+    constexpr std::size_t kWidth = kNativeLanes<Real>;
+    return requires(const E& e, typename E::Walk& walk, const Along& ray, LaneFlight<Real, kWidth>& flight,
+                    LaneRng<Real, kWidth>& rng, const Lanes<Real, kWidth>& extinction) {
+      e.init(walk, ray, flight, rng);
+      e.propose(walk, ray, flight, rng);
+      e.consume(walk, ray, flight, extinction, rng);
+      e.result(walk, ray);
+    };
+  } else {
+    return false;
+  }
+}
+
+}  // namespace nullmark

@@ -1,0 +1,464 @@
+#include "harness/kernel/path_kernel.h"
+
+#include <fmt/format.h>
+
+#include "harness/kernel/homogeneous_walker.h"
+#include "harness/kernel/walker.h"
+
+namespace nullmark {
+namespace {
+
+/// A ray from a point of the scene up to a surface, and the part of it inside the medium, which begins at 0.
+struct Sight {
+  Ray world, local;
+  SurfaceHit hit;
+};
+
+Ray moved_to_begin(Ray ray) {
+  ray.origin = ray.at(ray.begin);
+  ray.end -= ray.begin;
+  ray.begin = 0;
+  return ray;
+}
+
+/// Where the medium lies.
+struct Place {
+  explicit Place(const Medium& medium) : to_local(medium.world_to_local()), bounds(medium.bounds()) {}
+
+  void look(Ray ray, std::span<const Surface> surfaces, Sight& out) const {
+    const SurfaceHit hit = first_hit(surfaces, ray);
+    ray.end = std::min(ray.end, hit.distance);
+    look(ray, out);
+    out.hit = hit;
+  }
+
+  void look(Ray ray, Sight& out) const {
+    out.hit = {};
+    out.local = clipped(transformed(ray, to_local), bounds);
+    ray.begin = out.local.begin;
+    ray.end = out.local.end;
+    out.world = moved_to_begin(ray);
+    out.local = moved_to_begin(out.local);
+  }
+
+  Affine to_local;
+  Box bounds;
+};
+
+Ray camera_ray(const RayContext& context) { return {context.world.origin, context.world.direction, 0, kInfinity}; }
+
+Spectrum or_black(const Spectrum& radiance, int channels) { return radiance_or_black<Spectrum>(radiance, channels); }
+
+Spectrum radiance_behind(const TransportScene& scene, const SurfaceHit& hit) {
+  return or_black(hit.surface ? hit.surface->radiance : scene.environment.radiance, scene.medium->channels());
+}
+
+/// What is known of the mean: see make_path_kernel.
+Spectrum known_radiance(const TransportScene& scene, const Ray& camera) {
+  const int channels = scene.medium->channels();
+  const Effects effects = effects_of(scene);
+  Spectrum environment = or_black(scene.environment.radiance, channels);
+  const Spectrum emitted = or_black(scene.emission.radiance, channels);
+  if (effects.emission && scene.emission.field) return Spectrum::Constant(channels, std::nan(""));
+  if (!effects.scattering) {
+    Sight sight;
+    Place(*scene.medium).look(camera, scene.surfaces, sight);
+    const Spectrum depth = optical_depth(*scene.medium, sight.local).depth;
+    const Spectrum transmittance = (-depth).exp(), absorbed = -depth.unaryExpr([](Real x) { return std::expm1(-x); });
+    return transmittance * radiance_behind(scene, sight.hit) + absorbed * emitted;
+  }
+  bool equilibrium = !effects.absorption || (emitted == environment).all();
+  for (const Surface& surface : scene.surfaces)
+    equilibrium = equilibrium && (or_black(surface.radiance, channels) == environment).all();
+  if (equilibrium && !scene.options.most_scatterings) return environment;
+  return Spectrum::Constant(channels, std::nan(""));
+}
+
+class RadianceKernel : public Kernel {
+ public:
+  explicit RadianceKernel(const TransportScene& scene)
+      : scene_(scene),
+        place_(*scene.medium),
+        extrema_(scene.medium->extrema(place_.bounds)),
+        channels_(scene.medium->channels()) {}
+
+  bool needs_optical_depth() const override { return false; }
+  bool needs_knots() const override { return false; }
+  bool states_theory() const override { return false; }
+  bool answers(Quantity quantity) const override { return quantity == Quantity::radiance; }
+  std::size_t outputs(Quantity, const RayContext&) const override { return static_cast<std::size_t>(channels_); }
+  bool flies() const override { return false; }
+  bool states_count_law() const override { return false; }
+  std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const override { return {}; }
+  std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const override {
+    return std::vector<Theory>(static_cast<std::size_t>(channels_));
+  }
+
+ protected:
+  TransportScene scene_;
+  Place place_;
+  Extrema extrema_;
+  int channels_;
+};
+
+/// Where light is only absorbed, by constant extinction: nothing is drawn.
+class BeerLambertKernel final : public RadianceKernel {
+  struct State final : Workspace {
+    Spectrum radiance;
+  };
+
+ public:
+  using RadianceKernel::RadianceKernel;
+
+  std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
+
+  void begin_ray(Workspace& workspace, const Medium&, const Extrema&, const RayContext& context) const override {
+    static_cast<State&>(workspace).radiance = known_radiance(scene_, camera_ray(context));
+  }
+
+  void sample(Workspace& workspace, const Medium&, const RayContext&, std::uint64_t, std::uint64_t, std::size_t count, Quantity,
+              SampleBlock& out, Counters& counters) const override {
+    const Spectrum& radiance = static_cast<State&>(workspace).radiance;
+    out.values.clear();
+    for (std::size_t i = 0; i < count; ++i) out.values.insert(out.values.end(), radiance.begin(), radiance.end());
+    out.lookups.assign(count, 0);
+    counters.samples += count;
+  }
+
+  Spectrum expected(const Workspace& workspace, const Spectrum&, Quantity) const override {
+    return static_cast<const State&>(workspace).radiance;
+  }
+};
+
+/// Where light is only absorbed, by any medium: the estimator's T times the radiance behind.
+class AbsorptionKernel final : public RadianceKernel {
+  struct State final : Workspace {
+    std::unique_ptr<Workspace> inner;
+    RayContext context;
+    Ray camera;
+    Spectrum behind;
+  };
+
+ public:
+  AbsorptionKernel(const TransportScene& scene, std::unique_ptr<const Kernel> transmittance)
+      : RadianceKernel(scene), transmittance_(std::move(transmittance)) {}
+
+  std::unique_ptr<Workspace> workspace() const override {
+    auto state = std::make_unique<State>();
+    state->inner = transmittance_->workspace();
+    return state;
+  }
+
+  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const RayContext& context) const override {
+    State& state = static_cast<State&>(workspace);
+    state.camera = camera_ray(context);
+    Sight sight;
+    place_.look(state.camera, scene_.surfaces, sight);
+    state.behind = radiance_behind(scene_, sight.hit);
+    RayContext& mine = state.context;
+    mine.world = sight.world;
+    mine.local = sight.local;
+    mine.index = context.index;
+    mine.albedo = context.albedo;
+    scene_.majorant->segments(mine.world, mine.local, mine.segments);
+    mine.knots.clear();
+    mine.exact_depth.reset();
+    if (transmittance_->needs_knots()) sorted_knots(medium, mine.local, mine.knots);
+    if (transmittance_->needs_optical_depth()) mine.exact_depth = optical_depth(medium, mine.local).depth;
+    transmittance_->begin_ray(*state.inner, medium, extrema, mine);
+  }
+
+  void sample(Workspace& workspace, const Medium& medium, const RayContext&, std::uint64_t key, std::uint64_t first,
+              std::size_t count, Quantity, SampleBlock& out, Counters& counters) const override {
+    State& state = static_cast<State&>(workspace);
+    state.inner->stop = state.stop;
+    state.inner->recording = state.recording;
+    transmittance_->sample(*state.inner, medium, state.context, key, first, count, Quantity::transmittance, out, counters);
+    const auto channels = static_cast<std::size_t>(channels_);
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t c = 0; c < channels; ++c) out.values[i * channels + c] *= state.behind[static_cast<Eigen::Index>(c)];
+  }
+
+  Spectrum expected(const Workspace& workspace, const Spectrum&, Quantity) const override {
+    return known_radiance(scene_, static_cast<const State&>(workspace).camera);
+  }
+
+ private:
+  std::unique_ptr<const Kernel> transmittance_;
+};
+
+bool vanished(Real weight) { return weight == 0; }
+bool vanished(const Spectrum& weight) { return (weight == 0).all(); }
+Real largest_magnitude(Real weight) { return std::abs(weight); }
+Real largest_magnitude(const Spectrum& weight) { return weight.abs().maxCoeff(); }
+
+/// Paths, compiled for the effects that can be seen in their code; absorption, chromatic and heterogeneous are decided by who
+/// constructs it.
+template <class Value, Effects kEffects>
+class PathKernel final : public RadianceKernel {
+  using Phase = std::conditional_t<kEffects.anisotropic, HenyeyGreenstein, Isotropic>;
+  using Paths = std::shared_ptr<const Walker<Value>>;
+
+  struct Leg {
+    Sight sight;
+    std::unique_ptr<WalkMemory> memory;
+  };
+  struct State final : Workspace {
+    Ray camera_ray;
+    Leg camera, onward, shadow;  ///< of all samples; after a scattering; towards the environment
+    Course<Value> course;
+  };
+
+ public:
+  PathKernel(const TransportScene& scene, Paths walker, Paths shadow_walker)
+      : RadianceKernel(scene),
+        phase_(make_phase(scene.mean_cosine)),
+        walker_(std::move(walker)),
+        shadow_walker_(std::move(shadow_walker)),
+        albedo_(radiance_or_black<Value>(scene.albedo, channels_)),
+        environment_(radiance_or_black<Value>(scene.environment.radiance, channels_)) {
+    for (const Surface& surface : scene_.surfaces) surfaces_.push_back(radiance_or_black<Value>(surface.radiance, channels_));
+  }
+
+  std::unique_ptr<Workspace> workspace() const override {
+    auto state = std::make_unique<State>();
+    state->camera.memory = walker_->memory();
+    state->onward.memory = walker_->memory();
+    state->shadow.memory = shadow_walker_->memory();
+    return state;
+  }
+
+  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema&, const RayContext& context) const override {
+    State& state = static_cast<State&>(workspace);
+    state.course = {&medium, &extrema_, scene_.majorant.get(), channels_, albedo_, kEffects.emission};
+    state.camera_ray = camera_ray(context);
+    begin_leg(state, state.camera, *walker_, state.camera_ray);
+  }
+
+  void sample(Workspace& workspace, const Medium&, const RayContext& context, std::uint64_t key, std::uint64_t first,
+              std::size_t count, Quantity, SampleBlock& out, Counters& counters) const override {
+    State& state = static_cast<State&>(workspace);
+    const auto channels = static_cast<std::size_t>(channels_);
+    out.values.resize(count * channels);
+    out.lookups.assign(count, 0);
+    counters.samples += count;
+    Patience patience(state.stop);
+    for (std::size_t k = 0; k < count && !patience.stopped(); ++k) {
+      Rng rng(SampleAddress{key, context.index, first + k});
+      const std::uint64_t lookups_before = counters.lookups;
+      patience.start(scene_.options.most_events);
+      store(path(state, rng, patience, counters), &out.values[k * channels]);
+      out.lookups[k] = static_cast<std::uint32_t>(counters.lookups - lookups_before);
+      counters.draws += rng.draws();
+      if (state.recording) {
+        state.recording->walks.emplace_back();
+        state.recording->walks.back().draws = rng.draws();
+      }
+    }
+    counters.overruns += patience.overruns();
+  }
+
+  Spectrum expected(const Workspace& workspace, const Spectrum&, Quantity) const override {
+    return known_radiance(scene_, static_cast<const State&>(workspace).camera_ray);
+  }
+
+ private:
+  static Phase make_phase(Real mean_cosine) {
+    if constexpr (kEffects.anisotropic)
+      return HenyeyGreenstein(mean_cosine);
+    else
+      return Isotropic();
+  }
+
+  Value uniform(Real x) const { return uniform_value<Value>(channels_, x); }
+
+  void begin_leg(State& state, Leg& leg, const Walker<Value>& walker, const Ray& ray) const {
+    if constexpr (kEffects.surfaces)
+      place_.look(ray, scene_.surfaces, leg.sight);
+    else
+      place_.look(ray, leg.sight);
+    if (leg.sight.world.length() > 0) walker.begin(*leg.memory, state.course, leg.sight.world, leg.sight.local);
+  }
+
+  Value path(State& state, Rng& rng, Patience& patience, Counters& counters) const {
+    Value radiance = uniform(0), throughput = uniform(1);
+    Leg* leg = &state.camera;
+    for (int scatterings = 0;; ++scatterings) {
+      Event<Value> event{EventKind::escape, 0, uniform(1)};
+      if (leg->sight.world.length() > 0) event = walker_->fly(*leg->memory, state.course, throughput, rng, patience, counters);
+      if (!patience.spend()) return radiance;
+      throughput *= event.weight;
+      if (!is_collision(event.kind)) {
+        radiance += throughput * radiance_at_end(leg->sight, scatterings);
+        return radiance;
+      }
+      const Vec3 point = leg->sight.world.at(event.distance);
+      if (!scatters(event.kind, throughput, rng)) {
+        if constexpr (kEffects.emission) radiance += throughput * scene_.emission.at<Value>(point, channels_, counters.lookups);
+        return radiance;
+      }
+      if constexpr (!kEffects.scattering) return radiance;
+      if (scene_.options.most_scatterings && scatterings == *scene_.options.most_scatterings) return radiance;
+      const Vec3& direction = leg->sight.world.direction;
+      if constexpr (kEffects.next_event)
+        if (scene_.options.next_event != NextEvent::off)
+          radiance += throughput * from_environment(state, point, direction, rng, patience, counters);
+      if (vanished(throughput) || !survives(scatterings + 1, throughput, rng)) return radiance;
+      begin_leg(state, state.onward, *walker_, {point, phase_.sample(direction, rng), 0, kInfinity});
+      leg = &state.onward;
+    }
+  }
+
+  /// Of the surface met or of the environment, unless next events have counted that already.
+  Value radiance_at_end(const Sight& sight, int scatterings) const {
+    if constexpr (kEffects.surfaces)
+      if (sight.hit.surface) return surfaces_[static_cast<std::size_t>(sight.hit.surface - scene_.surfaces.data())];
+    if constexpr (kEffects.next_event)
+      if (scatterings > 0 && scene_.options.next_event != NextEvent::off) return uniform(0);
+    return environment_;
+  }
+
+  /// Whether a collision is a scattering; weighs the throughput accordingly.  Where nothing emits it always is, for absorption
+  /// adds nothing; otherwise one of the two is drawn, on chromatic media with the albedo averaged over what each channel carries,
+  /// so that the mean of |throughput| over the channels stays what it was [Kutz et al. 2017, Sec. 5].
+  bool scatters(EventKind kind, Value& throughput, Rng& rng) const {
+    if (kind != EventKind::collision) return kind == EventKind::scatter;
+    if constexpr (!kEffects.scattering) return false;
+    if constexpr (!kEffects.emission) {
+      throughput *= albedo_;
+      return true;
+    } else if constexpr (std::is_same_v<Value, Real>) {
+      return rng.uniform() < albedo_;
+    } else {
+      const Real whole = throughput.abs().sum();
+      if (whole == 0) return true;
+      const Real scattered = (throughput.abs() * albedo_).sum(), absorbed = (throughput.abs() * (1 - albedo_)).sum();
+      const Real both = scattered + absorbed;
+      const bool chosen = rng.uniform() * both < scattered;
+      throughput *= chosen ? Value(albedo_ * (both / scattered)) : Value((1 - albedo_) * (both / absorbed));
+      return chosen;
+    }
+  }
+
+  /// Radiance that comes from the environment straight to a point and is scattered there into the path.
+  Value from_environment(State& state, const Vec3& point, const Vec3& direction, Rng& rng, Patience& patience,
+                         Counters& counters) const {
+    Vec3 towards;
+    Real weight = 1;  // phase function over density of the direction
+    if (scene_.options.next_event == NextEvent::phase) {
+      towards = phase_.sample(direction, rng);
+    } else {
+      const Isotropic uniform_directions;
+      towards = uniform_directions.sample(direction, rng);
+      weight = phase_.value(direction, towards) / uniform_directions.value(direction, towards);
+    }
+    Leg& leg = state.shadow;
+    begin_leg(state, leg, *shadow_walker_, {point, towards, 0, kInfinity});
+    if (leg.sight.hit.surface) return uniform(0);
+    if (!(leg.sight.world.length() > 0)) return environment_ * weight;
+    return shadow_walker_->transmittance(*leg.memory, state.course, rng, patience, counters) * environment_ * weight;
+  }
+
+  bool survives(int scatterings, Value& throughput, Rng& rng) const {
+    if (!scene_.options.roulette_from || scatterings < *scene_.options.roulette_from) return true;
+    const Real probability = std::max(scene_.options.roulette_floor, std::min<Real>(1, largest_magnitude(throughput)));
+    if (probability == 1) return true;
+    throughput /= probability;
+    return rng.uniform() < probability;
+  }
+
+  Phase phase_;
+  Paths walker_, shadow_walker_;
+  Value albedo_, environment_;
+  std::vector<Value> surfaces_;  ///< radiance of each
+};
+
+/// f(std::true_type or std::false_type): a flag of the run becomes one of the compiler.
+template <class F>
+auto compiled(bool flag, const F& f) {
+  return flag ? f(std::true_type{}) : f(std::false_type{});
+}
+
+template <class Value>
+std::unique_ptr<const Kernel> compiled_path_kernel(const TransportScene& scene, const Effects& effects,
+                                                   std::shared_ptr<const Walker<Value>> walker,
+                                                   std::shared_ptr<const Walker<Value>> shadow) {
+  using Result = std::unique_ptr<const Kernel>;
+  return compiled(effects.surfaces, [&](auto surfaces) -> Result {
+    // Without scattering there is neither a phase function nor a next event, and without emission there would be no path.
+    if (!effects.scattering) {
+      constexpr Effects kEffects{.scattering = false, .anisotropic = false, .surfaces = surfaces(), .next_event = false};
+      return std::make_unique<PathKernel<Value, kEffects>>(scene, walker, shadow);
+    }
+    return compiled(effects.emission, [&](auto emission) -> Result {
+      return compiled(effects.anisotropic, [&](auto anisotropic) -> Result {
+        return compiled(effects.next_event, [&](auto next_event) -> Result {
+          constexpr Effects kEffects{
+              .emission = emission(), .anisotropic = anisotropic(), .surfaces = surfaces(), .next_event = next_event()};
+          return std::make_unique<PathKernel<Value, kEffects>>(scene, walker, shadow);
+        });
+      });
+    });
+  });
+}
+
+template <class Value>
+std::unique_ptr<const Kernel> make(const TransportScene& scene, const Effects& effects,
+                                   std::shared_ptr<const Walker<Value>> sampler, std::shared_ptr<const Walker<Value>> shadow) {
+  const int channels = scene.medium->channels();
+  if (!effects.heterogeneous) {
+    const Spectrum extinction = scene.medium->extrema(scene.medium->bounds()).maximum;
+    const auto walker = std::make_shared<HomogeneousWalker<Value>>(load<Value>(extinction.data(), channels));
+    return compiled_path_kernel<Value>(scene, effects, walker, walker);
+  }
+  return compiled_path_kernel<Value>(scene, effects, sampler, shadow ? shadow : sampler);
+}
+
+template <class Walk>
+std::string why_not(const Walk& walk, const Medium& medium) {
+  if (walk.needs_knots() && !medium.polynomial_degree()) return "the medium is not polynomial between knots";
+  const Box bounds = medium.bounds();
+  if (walk.needs_optical_depth() && !medium.optical_depth({bounds.lo, bounds.extent(), 0, 1}))
+    return "the medium has no closed-form optical depth";
+  return "";
+}
+
+template <class Value>
+std::string why_no_flights(const std::shared_ptr<const Walker<Value>>& sampler,
+                           const std::shared_ptr<const Walker<Value>>& shadow, const TransportScene& scene) {
+  const int channels = scene.medium->channels();
+  if (!sampler || !sampler->samples_events(channels))
+    return fmt::format("it samples no free paths{}, which scattering and emission need",
+                       channels > 1 ? " of several channels" : "");
+  const std::string reason = why_not(*sampler, *scene.medium);
+  return reason.empty() && shadow ? why_not(*shadow, *scene.medium) : reason;
+}
+
+Effects asked_for(const TransportScene& scene, bool general) { return general ? Effects{} : effects_of(scene); }
+
+}  // namespace
+
+std::string why_no_paths(const EstimatorSource& estimator, const TransportScene& scene, bool general) {
+  const Effects effects = asked_for(scene, general);
+  if (!effects.heterogeneous) return "";
+  if (!effects.scattering && !effects.emission) return why_not(*estimator.kernel(scene.medium->channels()), *scene.medium);
+  const Walkers walkers = estimator.walkers(), &shadow = scene.towards_environment;
+  return effects.chromatic ? why_no_flights(walkers.chromatic, shadow.chromatic, scene)
+                           : why_no_flights(walkers.grey, shadow.grey, scene);
+}
+
+std::unique_ptr<const Kernel> make_path_kernel(const EstimatorSource& estimator, const TransportScene& scene, bool general) {
+  scene.check();
+  if (const std::string reason = why_no_paths(estimator, scene, general); !reason.empty())
+    throw ParameterError("type", "the estimator cannot carry light here: " + reason);
+  const Effects effects = asked_for(scene, general);
+  if (!effects.scattering && !effects.emission) {
+    if (!effects.heterogeneous) return std::make_unique<BeerLambertKernel>(scene);
+    return std::make_unique<AbsorptionKernel>(scene, estimator.kernel(scene.medium->channels()));
+  }
+  const Walkers walkers = estimator.walkers();
+  if (effects.chromatic) return make<Spectrum>(scene, effects, walkers.chromatic, scene.towards_environment.chromatic);
+  return make<Real>(scene, effects, walkers.grey, scene.towards_environment.grey);
+}
+
+}  // namespace nullmark

@@ -1,0 +1,167 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/model/plan.h"
+#include "media/majorants/majorant.h"
+
+namespace nullmark {
+
+/// `skipped`: the combination does not apply or its data is missing.  `not_run`: never started (time budget, interrupt).
+enum class Status { ok, skipped, not_run, error };
+
+/// Statistics of one channel, or of one output of a quantity with several.  Absent: not known or not finite.
+struct ChannelRecord {
+  std::optional<Real> mean, reference, reference_error;  ///< averages over the rays
+  std::optional<Real> bias;                              ///< mean - reference
+  std::optional<Real> bias_theory;                       ///< mean that the estimator predicts - reference
+  std::optional<Real> rmse;                              ///< over the rays' means
+  std::optional<Real> rmse_theory;                       ///< sqrt(mean over rays of variance_theory / n + predicted bias^2)
+  std::optional<Real> variance;                          ///< per sample, averaged over the rays
+  std::optional<Real> variance_theory;
+  std::optional<Real> relative_variance;  ///< variance (theory where known) over the mean square of the reference
+  std::optional<Real> kurtosis;           ///< of the errors around the reference, pooled
+  std::optional<Real> reference_rms;      ///< root mean square over the rays
+};
+
+/// Error of the mean of n samples, measured over all disjoint groups of n.
+struct ConvergenceRecord {
+  std::uint64_t samples = 0;
+  std::vector<std::optional<Real>> rmse, variance;  ///< per channel
+};
+
+/// What a sample costs where so many share a walk through the majorant structure.
+struct BatchTime {
+  std::uint64_t samples_per_traversal = 1;
+  Real ns_per_sample = 0, mad = 0;
+};
+
+struct TimeRecord {
+  Real ns_per_sample = 0, ns_per_lookup = 0;
+  Real floor_ratio = 0;  ///< ns per lookup over random number + logarithm + advance in registers of the cell's precision
+  Real loop_ratio = 0;   ///< ns per lookup over the plain hand-written ratio loop on a constant medium in the same process
+  Real mad = 0;          ///< median absolute deviation of ns_per_sample
+  int repetitions = 0, threads = 1;
+  std::uint64_t samples_per_traversal = 1;
+  std::vector<Real> repetition_ns;   ///< ns per sample of each repetition
+  Real majorant_build_seconds = 0;   ///< wall time of building the majorant structure, on all threads
+  std::vector<BatchTime> batches{};  ///< ascending; the last is that of ns_per_sample; empty where it is the only one
+  Real memory_ratio = 0;             ///< of volumes: ns per lookup over one read of a random cache line of as many bytes; else 0
+  std::optional<Real> waiting{};     ///< share of the wall time in which the timed thread did not run, median over repetitions
+};
+
+/// PASS: |bias| < epsilon is proven.  FAIL: a bias is proven (or one beyond epsilon, as `Tolerate` says).  INCONCLUSIVE: neither,
+/// with the reason.  VIOLATED: the estimator needs a true majorant and did not have one.  Empty: nothing is claimed, or nothing
+/// was tested.
+enum class Outcome { none, pass, fail, inconclusive, violated };
+
+/// Evidence of one test, as `check` derives its outcome.
+struct TestRecord {
+  int channel = 0;  ///< -1: lookups
+  int group = -1;   ///< -1: all rays
+  std::uint64_t samples = 0;
+  Real epsilon = 0, reference_error = 0;  ///< absolute
+  Real reference = 0;                     ///< expected mean, averaged over the rays of the test
+  Real mean_error = 0;                    ///< of the samples against it
+  Real variance = 0;                      ///< that the bets were planned with
+  /// "betting", "catoni", "catoni+betting", "deterministic", "none" (nothing could be bet), or "counted" (lookups, where the
+  /// harness draws the flights: see counted_lookups.h).
+  std::string basis;
+  /// Against "mean error 0", "at most -epsilon", "at least epsilon", "within epsilon".
+  Real log_e_fail = 0, log_e_low = 0, log_e_high = 0, log_e_beyond = 0;
+  Real largest_error = 0, rounding = 0;  ///< of single samples; deterministic tests
+  std::uint64_t planned = 0;             ///< samples per ray
+  std::vector<Real> rates;               ///< of the bets against "mean error 0"
+  Outcome outcome = Outcome::none;
+
+  bool deterministic() const { return basis == "deterministic"; }
+};
+
+/// A law that walks must follow, as `check` derives its outcome.
+struct LawRecord {
+  std::string name;
+  Real log_e = 0;             ///< evidence against it: log of an e-value, or -log of a probability
+  std::uint64_t samples = 0;  ///< observations
+  Outcome outcome = Outcome::none;
+};
+
+struct VerdictRecord {
+  /// Of the mean: against the reference for estimators that claim to be unbiased, else against the mean they predict of
+  /// themselves, which proves nothing about T.
+  Outcome unbiased = Outcome::none, own_mean = Outcome::none;
+  Outcome lookups = Outcome::none;
+  std::string reason;  ///< of an INCONCLUSIVE, or what fails
+  std::string proves;  ///< what a PASS proves: "|bias| < 0.37 % of the mean"
+  Tolerate tolerate = Tolerate::nothing;
+  bool within = false, beyond = false, biased = false;  ///< what is proven of the mean error: see verdict.h
+  std::string against;                                  ///< "reference", or "own mean" of an estimator that predicts its bias
+  std::string variance_basis;                           ///< "analytic", "pilot" or "none"
+  bool planned_undecidable = false;                     ///< the plan said beforehand that no affordable number of samples decides
+  bool violated = false;                                ///< needs a true majorant, and the extinction was seen above it
+  bool bound_unproven = false;                          ///< the majorant is not known to bound, and nothing was seen above it
+  std::uint64_t counted_walks = 0;                      ///< whose lookups were found to be their collisions, one by one
+  std::uint64_t nonfinite = 0;                          ///< among the samples beyond the planned ones
+  std::uint64_t out_of_range = 0;                       ///< samples outside the range the estimator declares
+  std::uint64_t samples_per_ray = 0;                    ///< used in the end
+  std::uint64_t planned = 0, affordable = 0;            ///< samples per ray
+  std::uint64_t family = 1, lookups_family = 1;
+  Real alpha = 1e-4, alpha_pass = 1e-3;
+  std::vector<TestRecord> tests;
+  std::uint64_t laws_family = 1;
+  std::vector<LawRecord> laws;        ///< how samples and walks behave beside their mean: see walk_laws.h
+  std::vector<std::string> untested;  ///< what the claims rest on and no law tests, with the reason
+  Outcome lawful = Outcome::none;     ///< PASS: no law is broken
+};
+
+struct CellRecord {
+  Cell cell;
+  MediumSpec medium;
+  Component majorant, ray_set;
+  std::string medium_hash;
+  std::optional<StructureSize> structure;  ///< of the majorant; absent where it was not built
+  std::string claims, range;
+  bool given_depth = false;      ///< the estimator is handed the exact optical depth
+  std::optional<Real> reliance;  ///< of such: how much of its answer is that depth, 1 all of it; see reliance.h
+  std::optional<Real> order;     ///< of a consistent estimator's bias in its step
+  int channels = 1;
+  std::vector<std::string> outputs;  ///< of quantities with several numbers a channel, what each entry of `channel` is
+  std::vector<std::string> effects{"absorption"};
+  Status status = Status::not_run;
+  std::string reason;
+  std::uint64_t rays = 0, samples = 0;
+  std::string reference_method;
+  std::string variance_basis;  ///< "analytic" or "sample"
+  std::vector<ChannelRecord> channel;
+  std::optional<Real> lookups_per_sample, lookups_theory, null_collisions_per_sample, draws_per_sample;
+  std::uint64_t lookups = 0, draws = 0;  ///< exact totals
+  /// Of one sample's lookups, averaged over the rays; where every ray has one sample, over all of them, which is more.
+  std::optional<Real> lookups_variance;
+  std::optional<std::uint64_t> instructions;  ///< that drawing the samples took, counted in a simulator; see performance_gate.md
+  std::uint64_t majorant_violations = 0, nonfinite = 0;
+  std::optional<Real> largest_violation;  ///< max mu / mub seen beyond 1
+  std::optional<Real> largest_sample;     ///< max |X| of the finite samples, all outputs together
+  std::optional<TimeRecord> time;
+  std::optional<VerdictRecord> verdict;
+  std::vector<ConvergenceRecord> convergence;
+  /// Mean squared errors of disjoint parts of the samples (BlockErrors), averaged over channels; estimators on the same streams
+  /// have the same parts.  Empty where there are too few samples, and for quantities with several numbers a channel.
+  std::vector<Real> squared_error_blocks;
+  std::map<std::string, std::string> images;  ///< "mean", "variance", "lookups" -> path relative to the results file
+};
+
+/// One run: what the results file holds.
+struct RunRecord {
+  static constexpr int kSchema = 1;
+  std::string name;
+  std::string config_text;
+  std::map<std::string, std::string> provenance;  ///< values are JSON texts
+  std::vector<CellRecord> cells;
+  std::vector<Table> tables;
+  std::vector<PublishedClaim> claims;
+};
+
+}  // namespace nullmark

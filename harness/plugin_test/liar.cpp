@@ -1,8 +1,0 @@
-#include "harness/registry.h"
-#include "lying_tracker.h"
-
-namespace nullmark {
-
-NULLMARK_REGISTER_ESTIMATOR(LyingTracker);
-
-}  // namespace nullmark

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <memory>
+
+#include "harness/kernel/estimator_template.h"
+#include "harness/registry/estimator_entry.h"
+
+namespace nullmark {
+
+template <template <class> class Estimator>
+EstimatorEntry estimator_entry() {
+  using E = Estimator<Real>;
+  EstimatorEntry entry;
+  entry.name = E::kName;
+  entry.summary = E::kSummary;
+  entry.source = E::kSource;
+  entry.range = Estimator<Spectrum>::kRange;
+  entry.needs_bound = E::kNeedsBound;
+  entry.in_lanes = runs_in_lanes<Estimator>();
+  entry.ignores_majorant = requires { E::kIgnoresMajorant; };
+  entry.heavy_samples = requires { E::kHeavySamples; };
+  entry.heavy_lookups = requires { E::kHeavyLookups; };
+  const auto kernel = EstimatorTemplate<Estimator>().kernel(1);
+  for (std::size_t i = 0; i < kQuantities; ++i)
+    if (kernel->answers(static_cast<Quantity>(i))) entry.quantities.push_back(static_cast<Quantity>(i));
+  entry.quantities.push_back(Quantity::radiance);  // where nothing scatters or emits, any transmittance carries light
+  entry.make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<EstimatorTemplate<Estimator>>(); };
+  return entry;
+}
+
+/// `Bug` has kCaughtBy: "mean", "count_law", "replay", "lookups", "variance", "independence", "audit", "nonfinite", "groups",
+/// "position_law", "chi_square", "reliance" (CellRecord::reliance says so) or "open" (an INCONCLUSIVE that was not planned).
+template <template <class> class Bug, class Source = EstimatorTemplate<Bug>>
+EstimatorEntry planted_entry() {
+  EstimatorEntry entry = estimator_entry<Bug>();
+  entry.make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<Source>(); };
+  entry.planted = true;
+  entry.caught_by = Bug<Real>::kCaughtBy;
+  return entry;
+}
+
+}  // namespace nullmark
+
+/// One line makes an estimator known to every command and to the contract tests.  In the tree the build writes it from
+/// `nullmark_estimator(header Class)`; a plug-in writes it itself.
+#define NULLMARK_REGISTER_ESTIMATOR(Estimator)                                                \
+  [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_estimator_, __COUNTER__) = \
+      ::nullmark::Registry<::nullmark::EstimatorEntry>::instance().add(::nullmark::estimator_entry<Estimator>())
+
+/// The same for a planted bug; `__VA_ARGS__` is its template and, where that is not EstimatorTemplate, its source.
+#define NULLMARK_REGISTER_PLANTED_BUG(...)                                                  \
+  [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_planted_, __COUNTER__) = \
+      ::nullmark::Registry<::nullmark::EstimatorEntry>::instance().add(::nullmark::planted_entry<__VA_ARGS__>())

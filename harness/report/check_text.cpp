@@ -1,0 +1,150 @@
+#include "harness/report/check_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "harness/io/text.h"
+#include "harness/model/names.h"
+#include "harness/report/claims_text.h"
+#include "harness/report/junit.h"
+#include "harness/verdict/cell_word.h"
+
+namespace nullmark {
+namespace {
+
+/// How many cells of a kind have each mark: " (3 by pilot, 1 own mean)"; empty where none has one.
+std::string marks_among(const RunRecord& run, Kind kind) {
+  std::map<Mark, std::size_t> counts;
+  for (const CellRecord& record : run.cells)
+    if (kind_of(record) == kind)
+      for (const Mark mark : marks_of(record)) ++counts[mark];
+  std::string text;
+  for (const auto& [mark, count] : counts) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, mark_name(mark));
+  return text.empty() ? "" : fmt::format(" ({})", text);
+}
+
+std::string counts(const RunRecord& run, const Summary& s) {
+  return fmt::format(
+      "{} PASS{}, {} FAIL{}, {} INCONCLUSIVE as planned{}, {} INCONCLUSIVE{}, {} VIOLATED, {} errors, {} not run, {} claim "
+      "nothing",
+      s.pass, marks_among(run, Kind::pass), s.fail, marks_among(run, Kind::fail), s.expected_open,
+      marks_among(run, Kind::expected_open), s.unexpected_open, marks_among(run, Kind::unexpected_open), s.violated, s.errors,
+      s.not_run, s.unclaimed);
+}
+
+std::string order_line(const OrderFit& fit) {
+  if (fit.steps.size() < 3) return fmt::format("{}: claimed order {:.0f}, {}", fit.name, fit.claimed, fit.reason);
+  return fmt::format("{}: claimed order {:.0f}, measured {:.3f} +- {:.3f}: {}", fit.name, fit.claimed, fit.order, fit.half_width,
+                     fit.outcome == Outcome::inconclusive ? fit.reason : to_string(fit.outcome));
+}
+
+bool disables_verdict(const Json& cell) {
+  if (!cell.is_object() || !cell.contains("gate")) return false;
+  const Json& gate = cell["gate"];
+  return gate.is_object() && gate.contains("enabled") && gate["enabled"] == false;
+}
+
+std::size_t met(const std::vector<Expectation>& all) {
+  return static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [](const Expectation& one) { return one.met; }));
+}
+
+/// ": 3 because no ray meets any extinction: nothing was tested"; empty where no cell says why.
+std::string reasons_of_unclaimed(const RunRecord& run) {
+  std::map<std::string, std::size_t> reasons;
+  for (const CellRecord& record : run.cells)
+    if (kind_of(record) == Kind::unclaimed && !record.reason.empty()) ++reasons[record.reason];
+  std::string text;
+  for (const auto& [reason, count] : reasons) text += fmt::format("{} {} ({})", text.empty() ? ":" : ";", reason, count);
+  return text;
+}
+
+/// What keeps a run whose cells are good from being a success, and what was left out on purpose.
+std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary) {
+  std::vector<std::string> lines;
+  if (summary.selected < summary.configured) {
+    const auto filter = run.provenance.find("filter");
+    lines.push_back(fmt::format("{} of the configuration's {} cells were selected{}{}", summary.selected, summary.configured,
+                                run.provenance.contains("covering") ? " by --covering" : "",
+                                filter == run.provenance.end() ? "" : fmt::format(" by --filter {}", filter->second)));
+  }
+  if (summary.never_started > 0)
+    lines.push_back(fmt::format("{} cells of the configuration were never started", summary.never_started));
+  if (summary.altered > 0) lines.push_back(fmt::format("{} verdicts in the file are not what its figures say", summary.altered));
+  lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());
+  if (!summary.nothing_proven.empty()) lines.push_back(summary.nothing_proven);
+  if (summary.strict && summary.undecided_claims > 0)
+    lines.push_back(fmt::format("--strict: {} cells that claim something are not decided", summary.undecided_claims));
+  return lines;
+}
+
+std::string families(const RunRecord& run) {
+  for (const CellRecord& record : run.cells)
+    if (record.verdict)
+      return fmt::format(
+          "at most {:g} of all runs show even one false FAIL among {} mean tests (and the same among {} of lookups)",
+          record.verdict->alpha, record.verdict->family, record.verdict->lookups_family);
+  const std::size_t off = configured_cells(run, disables_verdict), cells = run.cells.size();
+  if (off == 0) return "no cell was judged" + reasons_of_unclaimed(run);
+  return fmt::format("no cell was judged: the configuration disables the verdict in {} cells",
+                     off == cells ? fmt::format("all {}", cells) : fmt::format("{} of {}", off, cells));
+}
+
+}  // namespace
+
+std::string summary_text(const RunRecord& run, const Summary& summary) {
+  std::string text;
+  for (const Kind kind :
+       {Kind::pass, Kind::violated, Kind::expected_open, Kind::not_run, Kind::unexpected_open, Kind::error, Kind::fail})
+    for (const CellRecord& record : run.cells)
+      if (kind_of(record) == kind && (kind != Kind::pass || !marks_of(record).empty()))
+        text += fmt::format("{}: {}: {}\n", marked_word(record), record.cell.name, finding_of(record));
+  for (const OrderFit& fit : summary.orders) text += fmt::format("ORDER: {}\n", order_line(fit));
+  for (const Expectation& one : summary.expectations)
+    if (!one.met) text += fmt::format("{}: {}\n", one.measured ? "EXPECTED OTHERWISE" : "NOT MEASURED", expectation_line(one));
+  if (!summary.expectations.empty())
+    text += fmt::format("{} of {} expected numbers met\n", met(summary.expectations), summary.expectations.size());
+  if (!summary.findings.empty()) text += findings_text(summary.findings);
+  for (const std::string& line : remarks_of(run, summary)) text += line + "\n";
+  return text + fmt::format("{}\n{}\n", counts(run, summary), families(run));
+}
+
+std::string summary_markdown(const RunRecord& run, const Summary& summary, const std::string& file) {
+  std::string text = fmt::format("### nullmark check: {}\n\n{}; {}.\n", run.name, counts(run, summary), families(run));
+  for (const std::string& line : remarks_of(run, summary)) text += fmt::format("- {}\n", markdown_cell(line));
+  const auto table = [&](std::initializer_list<Kind> kinds, const std::string& title, bool commands) {
+    std::string rows;
+    std::size_t count = 0;
+    for (const CellRecord& record : run.cells)
+      if (std::find(kinds.begin(), kinds.end(), kind_of(record)) != kinds.end() &&
+          (kind_of(record) != Kind::pass || !marks_of(record).empty())) {
+        rows += fmt::format("| {} | {} | {} |\n", marked_word(record), markdown_cell(record.cell.name),
+                            markdown_cell(finding_of(record)));
+        if (commands) rows += fmt::format("| | | `{}` |\n", reproduction(record, file));
+        ++count;
+      }
+    if (count > 0)
+      text +=
+          fmt::format("\n<details{}><summary>{} ({})</summary>\n\n| verdict | cell | reason |\n|---|---|---|\n{}\n</details>\n",
+                      commands ? " open" : "", title, count, rows);
+  };
+  table({Kind::fail, Kind::error}, "Biased, or not computed", true);
+  table({Kind::unexpected_open}, "Undecided", false);
+  table({Kind::expected_open}, "Undecidable by their mean, as planned", false);
+  table({Kind::violated}, "Need a true majorant and did not have one", false);
+  table({Kind::pass}, "Passed, with a mark", false);
+  if (!summary.expectations.empty()) {
+    text += fmt::format("\n{} of {} expected numbers met.\n", met(summary.expectations), summary.expectations.size());
+    for (const Expectation& one : summary.expectations)
+      if (!one.met) text += fmt::format("- {}\n", markdown_cell(expectation_line(one)));
+  }
+  if (!summary.findings.empty()) text += fmt::format("\n{}", findings_markdown(summary.findings));
+  if (!summary.orders.empty()) {
+    text += "\n| convergence order |\n|---|\n";
+    for (const OrderFit& fit : summary.orders) text += fmt::format("| {} |\n", order_line(fit));
+  }
+  return text;
+}
+
+}  // namespace nullmark

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "harness/model/record.h"
+
+namespace nullmark {
+
+/// "google-benchmark", "csv", "jsonl", "junit".
+const std::vector<std::string>& export_formats();
+
+/// Results in another program's format; `file` is the results' path, which messages and reproduction commands name.
+///
+///   google-benchmark  one row per timed repetition, names estimator/medium/param:value; for compare.py
+///   csv               one row per cell and channel, RFC 4180
+///   jsonl             one cell of the results file per line, with the word for it, its marks and what stands beside them
+///   junit             one test case per cell: see junit.h
+std::string export_results(const RunRecord& run, const std::string& format, const std::string& file);
+
+}  // namespace nullmark

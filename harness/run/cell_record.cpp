@@ -1,0 +1,172 @@
+#include "harness/run/cell_record.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/model/metrics.h"
+#include "harness/model/names.h"
+#include "harness/registry/components.h"
+#include "harness/verdict/cell_word.h"
+#include "harness/verdict/judge.h"
+
+namespace nullmark {
+namespace {
+
+std::optional<Real> finite(Real x) { return std::isfinite(x) ? std::optional(x) : std::nullopt; }
+
+/// See CellRecord::lookups_variance.
+std::optional<Real> lookups_variance(const Sampled& sampled, Real samples_per_ray) {
+  Real within = 0, squares = 0, lookups = 0;
+  for (std::size_t ray = 0; ray < sampled.lookups.size(); ++ray) {
+    const auto of_ray = static_cast<Real>(sampled.lookups[ray]);
+    within += sampled.lookups_squared[ray] - of_ray * of_ray / samples_per_ray;
+    squares += sampled.lookups_squared[ray];
+    lookups += of_ray;
+  }
+  const auto rays = static_cast<Real>(sampled.lookups.size()), all = rays * samples_per_ray;
+  if (samples_per_ray > 1) return finite(std::max<Real>(0, within / (rays * (samples_per_ray - 1))));
+  if (all > 1) return finite(std::max<Real>(0, (squares - lookups * lookups / all) / (all - 1)));
+  return std::nullopt;
+}
+
+/// See CellRecord::squared_error_blocks.
+std::vector<Real> squared_error_blocks(const Sampled& sampled) {
+  std::vector<Real> mean(BlockErrors::kBlocks);
+  for (const BlockErrors& output : sampled.blocks)
+    for (std::size_t b = 0; b < mean.size(); ++b) {
+      if (output.count[b] == 0 || !std::isfinite(output.squares[b])) return {};
+      mean[b] += output.squares[b] / static_cast<Real>(output.count[b]) / static_cast<Real>(sampled.blocks.size());
+    }
+  return mean;
+}
+
+}  // namespace
+
+CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
+  const Cell& cell = *prepared.cell;
+  CellRecord record;
+  record.cell = cell;
+  record.cell.samples_per_ray = prepared.samples_per_ray;
+  record.medium = plan.media[cell.medium];
+  record.majorant = plan.majorants[cell.majorant];
+  record.ray_set = plan.ray_sets[cell.rays];
+  const auto* entry = Registry<EstimatorEntry>::instance().find(cell.estimator.type);
+  record.claims = to_string(make_estimator(cell.estimator)->claim(cell.quantity));
+  record.range = to_string(entry->range);
+  record.order = make_estimator(cell.estimator)->order(cell.quantity);
+  if (prepared.scene) {
+    record.channels = prepared.scene->medium->medium->channels();
+    record.rays = prepared.scene->rays->world.size();
+    record.structure = prepared.scene->majorant->structure->size();
+    record.medium_hash = fmt::format("{:016x}", prepared.scene->medium->hash);
+    if (record.channels > 1) record.effects.push_back("chromatic");
+    if (cell.quantity == Quantity::radiance) record.effects = prepared.effects;
+    if (const auto alone = make_estimator(cell.estimator)->kernel(record.channels, cell.precision))
+      record.given_depth = alone->needs_optical_depth();
+    if (!prepared.takes_part) record.reason = "constant extinction: closed-form flights, the estimator takes no part";
+  }
+  return record;
+}
+
+void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled) {
+  const Cell& cell = *prepared.cell;
+  const auto rays = static_cast<std::size_t>(record.rays);
+  const auto n = static_cast<Real>(rays), samples = static_cast<Real>(record.cell.samples_per_ray);
+  const Targets& targets = prepared.targets;
+  const std::size_t outputs = targets.outputs;
+  record.outputs = targets.names;
+  record.samples = sampled.counters.samples;
+  record.lookups = sampled.counters.lookups;
+  record.draws = sampled.counters.draws;
+  const auto total = static_cast<Real>(sampled.counters.samples);
+  record.lookups_per_sample = static_cast<Real>(record.lookups) / total;
+  record.draws_per_sample = static_cast<Real>(record.draws) / total;
+  record.null_collisions_per_sample = static_cast<Real>(sampled.counters.null_collisions) / total;
+  record.lookups_theory = prepared.theory.lookups;
+  record.lookups_variance = lookups_variance(sampled, samples);
+  record.majorant_violations = sampled.counters.violations;
+  if (sampled.counters.violations > 0) record.largest_violation = finite(sampled.counters.largest_violation);
+  record.largest_sample = finite(sampled.largest);
+  record.nonfinite = sampled.nonfinite;
+  record.reference_method = targets.method + (cell.measurement == Measurement{} ? "" : ", measured");
+  record.status = Status::ok;
+  if (sampled.nonfinite > 0) {
+    record.status = Status::error;
+    record.reason = fmt::format("{} of {} samples are not finite; `nullmark replay` shows the first", sampled.nonfinite,
+                                sampled.counters.samples);
+  }
+  record.variance_basis = "sample";
+  if (targets.known && targets.names.empty()) record.squared_error_blocks = squared_error_blocks(sampled);
+  for (std::size_t o = 0; o < outputs; ++o) {
+    Moments pooled;
+    Real mean = 0, reference = 0, reference_square = 0, error = 0, bias = 0, squares = 0, variance = 0;
+    for (std::size_t ray = 0; ray < rays; ++ray) {
+      const Moments& moments = sampled.moments[ray * outputs + o];
+      const Real truth = measured(targets.mean[ray * outputs + o], cell.measurement);
+      pooled += moments;
+      bias += moments.mean();
+      squares += moments.mean() * moments.mean();
+      variance += moments.variance();
+      mean += truth + moments.mean();
+      reference += truth;
+      reference_square += truth * truth;
+      error += targets.error[ray * outputs + o];
+    }
+    ChannelRecord out;
+    out.mean = finite(mean / n);
+    if (targets.known) {
+      out.reference = finite(reference / n);
+      out.reference_error = finite(error / n);
+      out.reference_rms = finite(std::sqrt(reference_square / n));
+      out.bias = finite(bias / n);
+      out.rmse = finite(std::sqrt(squares / n));
+    }
+    if (record.cell.samples_per_ray > 1) out.variance = finite(variance / n);
+    if (o < prepared.theory.variance.size() && prepared.theory.variance[o]) {
+      out.variance_theory = finite(*prepared.theory.variance[o]);
+      out.rmse_theory = finite(std::sqrt(*prepared.theory.variance[o] / samples + prepared.theory.squared_bias[o].value_or(0)));
+      record.variance_basis = "analytic";
+    }
+    if (o < prepared.theory.bias.size() && prepared.theory.bias[o]) out.bias_theory = finite(*prepared.theory.bias[o]);
+    const std::optional<Real>& best = best_variance(out);
+    if (best && reference_square > 0) out.relative_variance = finite(*best * n / reference_square);
+    const auto count = static_cast<Real>(pooled.count);
+    if (pooled.s2 > 0) out.kurtosis = finite(count * pooled.s4 / (pooled.s2 * pooled.s2));
+    record.channel.push_back(out);
+
+    const std::vector<GroupErrors::Level>& levels = sampled.groups[o].levels();
+    for (std::size_t level = 0; level < levels.size(); ++level) {
+      if (level >= record.convergence.size())
+        record.convergence.push_back(
+            {std::uint64_t{1} << level, std::vector<std::optional<Real>>(outputs), std::vector<std::optional<Real>>(outputs)});
+      const Real mean_square = levels[level].sum_of_squares / static_cast<Real>(levels[level].groups);
+      record.convergence[level].rmse[o] = finite(std::sqrt(mean_square));
+      record.convergence[level].variance[o] = finite(std::max<Real>(0, mean_square - bias / n * (bias / n)));
+    }
+  }
+}
+
+void drop_sampled_statistics(CellRecord& record) {
+  for (ChannelRecord& channel : record.channel) {
+    for (std::optional<Real> ChannelRecord::*figure :
+         {&ChannelRecord::mean, &ChannelRecord::bias, &ChannelRecord::rmse, &ChannelRecord::variance, &ChannelRecord::kurtosis})
+      (channel.*figure).reset();
+    if (!channel.variance_theory) channel.relative_variance.reset();
+  }
+  if (record.variance_basis == "sample") record.variance_basis.clear();
+  record.convergence.clear();
+  record.squared_error_blocks.clear();
+}
+
+void add_verdict(CellRecord& record, const PreparedCell& prepared, const std::optional<VerdictRecord>& verdict) {
+  record.verdict = verdict;
+  if (verdict && tests_nothing(prepared) && kind_of(record) != Kind::fail) {
+    record.verdict.reset();
+    record.reason = "no ray meets any extinction: nothing was tested";
+  }
+  if (!verdict && record.reason.empty()) record.reason = why_not_judged(prepared);
+}
+
+}  // namespace nullmark

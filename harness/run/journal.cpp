@@ -1,0 +1,123 @@
+#include "harness/run/journal.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "harness/io/file_io.h"
+#include "harness/io/results_json.h"
+
+namespace nullmark {
+namespace {
+
+constexpr int kJournalSchema = 1;
+
+/// Whether the path still leads to the open file: its last owner may have removed it between open and lock.
+bool still_there(int file, const std::string& path) {
+  struct stat opened, named;
+  return ::fstat(file, &opened) == 0 && ::stat(path.c_str(), &named) == 0 && opened.st_ino == named.st_ino &&
+         opened.st_dev == named.st_dev;
+}
+
+}  // namespace
+
+Journal::Journal(const std::string& results_path, const std::string& config_hash, Mode mode) : path_(path_for(results_path)) {
+  expect_replaceable(results_path);
+  lock();
+  try {
+    remove_leftovers(results_path);
+    read(config_hash, mode);
+  } catch (...) {
+    ::close(file_);
+    throw;
+  }
+}
+
+Journal::~Journal() {
+  if (file_ < 0) return;
+  if (!holds_cells_) ::unlink(path_.c_str());
+  ::close(file_);
+}
+
+void Journal::lock() {
+  for (;;) {
+    file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_APPEND, 0666);
+    if (file_ < 0)
+      throw InputError(fmt::format("{}: cannot be written: {}; give an -o in a folder that is there and can be written", path_,
+                                   std::strerror(errno)));
+    if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
+      ::close(file_);
+      throw InputError(path_ + ": another run is writing these results; wait for it or give another -o");
+    }
+    if (still_there(file_, path_)) return;
+    ::close(file_);
+  }
+}
+
+void Journal::read(const std::string& config_hash, Mode mode) {
+  const std::string text = read_file(path_);
+  const std::size_t complete = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
+  if (complete == 0 || mode == Mode::overwrite) {
+    write_header(config_hash);
+    return;
+  }
+  if (mode == Mode::fresh)
+    throw InputError(path_ + ": left by a run that did not finish; --resume goes on from it, --force starts again");
+
+  int number = 0;
+  for (std::size_t begin = 0; begin < complete;) {
+    const std::size_t end = text.find('\n', begin);
+    const std::string line = text.substr(begin, end - begin);
+    const std::string where = fmt::format("{}:{}", path_, ++number);
+    begin = end + 1;
+    const Json json = parse_json(line, where);
+    const Place place(json, where);
+    if (number > 1) {
+      CellRecord record = read_cell(place);
+      const auto same = [&](const CellRecord& other) {
+        return other.cell.id == record.cell.id && other.cell.name == record.cell.name;
+      };
+      cells_.erase(std::remove_if(cells_.begin(), cells_.end(), same), cells_.end());
+      cells_.push_back(std::move(record));
+      continue;
+    }
+    place.expect_object();
+    if (place["nullmark_journal"].integer(0, 1'000'000) != kJournalSchema)
+      place["nullmark_journal"].expected(fmt::format("{}, the journal this program writes", kJournalSchema));
+    if (const Place schema = place["nullmark_schema"]; schema.integer(0, 1'000'000) != RunRecord::kSchema)
+      schema.expected(fmt::format("{}, the schema this program writes", RunRecord::kSchema));
+    if (place["config_hash"].string() != config_hash)
+      place["config_hash"].expected(
+          fmt::format("\"{}\": the journal is of another configuration or seed; --force starts again", config_hash));
+  }
+  holds_cells_ = !cells_.empty();
+  if (complete < text.size() && ::ftruncate(file_, static_cast<off_t>(complete)) != 0)
+    throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
+}
+
+void Journal::write_header(const std::string& config_hash) {
+  if (::ftruncate(file_, 0) != 0) throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
+  const Json header = {
+      {"nullmark_journal", kJournalSchema}, {"nullmark_schema", RunRecord::kSchema}, {"config_hash", config_hash}};
+  write_durably(file_, header.dump() + "\n", path_);
+}
+
+void Journal::append(const CellRecord& record) {
+  holds_cells_ = true;
+  write_durably(file_, cell_json(record).dump() + "\n", path_);
+}
+
+void Journal::remove() {
+  // Under the lock, so that no other run can have begun to use the file.
+  ::unlink(path_.c_str());
+  ::close(file_);
+  file_ = -1;
+}
+
+}  // namespace nullmark

@@ -1,0 +1,97 @@
+#include "harness/run/merge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+#include "harness/config/config.h"
+#include "harness/io/results_json.h"
+#include "harness/io/spec_json.h"
+
+namespace nullmark {
+namespace {
+
+bool sampled(const CellRecord& record) { return record.status == Status::ok || record.status == Status::error; }
+
+std::string statistics_of(const CellRecord& record) {
+  RunRecord run;
+  run.cells.push_back(record);
+  return statistics_text(run);
+}
+
+/// Of two records of a cell the one that tells more.
+const CellRecord* better(const CellRecord* a, const CellRecord* b) {
+  const auto rank = [](const CellRecord& record) {
+    return (record.status == Status::ok ? 2 : record.status == Status::error ? 1 : 0) * 2 + (record.time ? 1 : 0);
+  };
+  return rank(*b) > rank(*a) ? b : a;
+}
+
+/// What a run was asked for, shards aside; JSON texts, empty where it does not say.
+std::array<std::string, 3> selection(const RunRecord& run) {
+  const auto text = [&](const char* key) {
+    const auto at = run.provenance.find(key);
+    return at == run.provenance.end() ? std::string() : at->second;
+  };
+  return {text("filter"), text("covering"), text("selected")};
+}
+
+}  // namespace
+
+RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<std::string>& names) {
+  if (parts.empty()) throw InputError("found no results to merge; expected at least one file");
+  struct Found {
+    const CellRecord* record;
+    std::size_t part;
+  };
+  std::map<std::string, Found> cells;
+  for (std::size_t part = 0; part < parts.size(); ++part) {
+    if (parts[part].config_text != parts[0].config_text)
+      throw InputError(fmt::format("{}: /config: found the configuration {}; expected that of {}, {}", names[part],
+                                   config_hash(parts[part].config_text), names[0], config_hash(parts[0].config_text)));
+    for (const CellRecord& record : parts[part].cells) {
+      const auto [at, added] = cells.emplace(record.cell.name, Found{&record, part});
+      if (added) continue;
+      const CellRecord& other = *at->second.record;
+      if (sampled(record) && sampled(other) && statistics_of(record) != statistics_of(other))
+        throw InputError(fmt::format("{}: cell \"{}\" has other statistics than in {}; expected the same to the last bit",
+                                     names[part], record.cell.name, names[at->second.part]));
+      at->second.record = better(at->second.record, &record);
+    }
+  }
+
+  RunRecord merged;
+  merged.name = parts[0].name;
+  merged.config_text = parts[0].config_text;
+  merged.tables = parts[0].tables;
+  merged.claims = parts[0].claims;
+  merged.provenance = parts[0].provenance;
+  Json list = Json::array();
+  for (const RunRecord& part : parts) {
+    list.push_back(Json::object());
+    for (const auto& [key, text] : part.provenance) list.back()[key] = known_json(text);
+  }
+  merged.provenance["parts"] = list.dump();
+  // Parts of one selection make it whole; those of several are measured by the whole configuration.
+  merged.provenance.erase("shard");
+  const bool same =
+      std::all_of(parts.begin(), parts.end(), [&](const RunRecord& part) { return selection(part) == selection(parts[0]); });
+  if (!same) {
+    merged.provenance.erase("filter");
+    merged.provenance.erase("covering");
+    merged.provenance.erase("selected");
+  }
+  for (const Cell& cell : read_config(parts[0].config_text, names[0] + "#config").cells)
+    if (const auto at = cells.find(cell.name); at != cells.end()) {
+      merged.cells.push_back(*at->second.record);
+      cells.erase(at);
+    }
+  if (!cells.empty())
+    throw InputError(
+        fmt::format("{}: cell \"{}\" is not of its configuration", names[cells.begin()->second.part], cells.begin()->first));
+  return merged;
+}
+
+}  // namespace nullmark

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <string>
+
+#include "harness/model/record.h"
+
+namespace nullmark {
+
+/// Tells on stderr how far a run is: a bar on a terminal (coloured unless NO_COLOR is set), elsewhere one line per cell.
+class Progress {
+ public:
+  Progress(std::size_t total);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void cell_progress(const CellRecord& record, double fraction);
+  void cell_done(const CellRecord& record, std::size_t done, std::size_t total);
+  void timing(double fraction);
+  void warning(const std::string& message);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void draw(double done, const std::string& doing);
+  void clear();
+
+  std::size_t total_, done_ = 0, timed_ = 0;
+  bool terminal_, colour_, drawn_ = false;
+  Clock::time_point start_ = Clock::now(), last_drawn_{};
+};
+
+}  // namespace nullmark

@@ -1,0 +1,192 @@
+#include "harness/run/run.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "harness/run/cell_images.h"
+#include "harness/run/cell_record.h"
+#include "harness/run/task_thread.h"
+#include "harness/sampling/test_families.h"
+#include "harness/sampling/timing.h"
+#include "harness/verdict/judge.h"
+#include "harness/verdict/reliance.h"
+
+namespace nullmark {
+namespace {
+
+struct CellOutcome {
+  CellRecord record;
+  Effort effort;
+};
+
+/// Samples and judges a cell.
+CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& families, bool late, const RunOptions& options,
+                     const RunObserver& observer, const std::function<bool()>& stop) {
+  CellOutcome outcome{blank_record(plan, prepared), {}};
+  CellRecord& record = outcome.record;
+  if (!prepared.reason.empty()) {
+    record.status = Status::skipped;
+    record.reason = prepared.reason;
+    return outcome;
+  }
+  if (stop() || late) {
+    record.reason = stop() ? "interrupted" : "time budget spent";
+    return outcome;
+  }
+  const auto progress = [&](double fraction) { observer.progress(record, fraction); };
+  std::vector<KeptSamples> kept;
+  const std::optional<CellGate> gate = tests_of(prepared, TestLevels{plan.levels.alpha_pass, families.means}, kept, stop);
+  const auto sampled =
+      sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
+                  {.per_ray = prepared.samples_per_ray, .keep = gate.has_value()}, gate ? &*gate : nullptr, stop, progress);
+  if (sampled) outcome.effort += *sampled;
+  if (sampled && sampled->counters.overruns == 0) kept.push_back(sampled->kept);
+  std::optional<VerdictRecord> verdict;
+  if (sampled && gate) verdict = judge(prepared, *gate, *sampled, kept, plan.levels, families, outcome.effort, stop, progress);
+  if (!sampled || (gate && !verdict)) {
+    record.reason = "interrupted";
+    return outcome;
+  }
+  fill_statistics(record, prepared, *sampled);
+  if (record.status == Status::ok && verdict && verdict->nonfinite > 0) {
+    record.status = Status::error;
+    record.nonfinite += verdict->nonfinite;
+    record.reason = fmt::format("{} samples are not finite, among those drawn for the verdict; `nullmark replay` shows the first",
+                                verdict->nonfinite);
+  }
+  if (record.status == Status::ok && outcome.effort.overruns > 0) {
+    record.status = Status::error;
+    record.reason = fmt::format("{} walks exceeded the bound on lookups", outcome.effort.overruns);
+  }
+  if (record.status == Status::ok) {
+    add_verdict(record, prepared, verdict);
+    record.reliance = measure_reliance(prepared.planned(), *prepared.scene, *prepared.kernel, stop);
+  } else {
+    drop_sampled_statistics(record);
+  }
+  write_images(record, prepared, *sampled, options, observer);
+  return outcome;
+}
+
+/// Calls `work` for 0 .. count - 1, begun in this order, one on each thread; threads that find none left help with the chunks of
+/// those under way.  Throws what the first that failed threw; `failed` is then set, and no further ones are begun.
+template <class F>
+void for_each_in_order(std::size_t count, int threads, std::atomic<bool>& failed, F&& work) {
+  std::atomic<std::size_t> next = 0;
+  std::exception_ptr error;
+  const auto take = [&](int) {
+    for (std::size_t i = next++; i < count && !failed; i = next++) {
+      // An exception that reached TBB would cut the others' chunks short in silence.
+      try {
+        // While it waits for chunks of its own, a thread must not begin another cell.
+        tbb::this_task_arena::isolate([&] { work(i); });
+      } catch (...) {
+        if (!failed.exchange(true)) error = std::current_exception();
+      }
+    }
+  };
+  tbb::parallel_for(0, std::max(1, threads), take, tbb::simple_partitioner{});
+  if (error) std::rethrow_exception(error);
+}
+
+}  // namespace
+
+std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
+                                 const RunOptions& options, const RunObserver& observer) {
+  const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(std::max(1, threads)));
+  const auto start = std::chrono::steady_clock::now();
+  const auto stop = [&] { return options.interrupted && options.interrupted->load() != 0; };
+
+  std::map<std::size_t, CellRecord> records;  // by place in the plan
+  for (std::size_t i = 0; i < plan.cells.size(); ++i)
+    for (const CellRecord& record : finished)
+      if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = record;
+
+  const bool timing = options.timing && plan.timing.enabled;
+  const Families families{mean_family(plan), lookups_family(plan), laws_family(plan)};
+  Workshop workshop(plan);
+  std::vector<PreparedCell> cells =
+      prepare_all(workshop, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
+  // Statistics of a resumed run stand; a run that was stopped before or while timing still owes the times.
+  const std::vector<PreparedCell> untimed = prepare_all(workshop, plan, [&](std::size_t i) {
+    const auto record = records.find(i);
+    return timing && record != records.end() && record->second.status == Status::ok && !record->second.time;
+  });
+  if (!stop()) add_theory(cells);
+
+  std::vector<CellOutcome> outcomes(cells.size());
+  {
+    std::mutex telling;
+    Background teller;
+    std::size_t done = 0;
+    std::atomic<bool> failed = false;
+    const auto given_up = [&] { return stop() || failed || teller.failed(); };
+    RunObserver guarded = observer;
+    guarded.warning = [&](const std::string& message) {
+      const std::lock_guard lock(telling);
+      observer.warning(message);
+    };
+    // Some progress untold is better than samples that wait.
+    guarded.progress = [&](const CellRecord& record, double fraction) {
+      if (const std::unique_lock lock(telling, std::try_to_lock); lock) observer.progress(record, fraction);
+    };
+    for_each_in_order(cells.size(), threads, failed, [&](std::size_t i) {
+      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      const bool late = options.time_budget && seconds > *options.time_budget;
+      outcomes[i] = run_cell(plan, cells[i], families, late, options, guarded, given_up);
+      teller.add([&, i] {
+        const std::lock_guard lock(telling);
+        observer.cell_done(outcomes[i].record, ++done, cells.size());
+      });
+    });
+    teller.finish();
+  }
+
+  std::vector<const PreparedCell*> to_time;
+  to_time.reserve(untimed.size() + cells.size());
+  for (const PreparedCell& prepared : untimed) to_time.push_back(&prepared);
+  Effort effort;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    effort += outcomes[i].effort;
+    if (outcomes[i].record.status == Status::ok) to_time.push_back(&cells[i]);
+    records[cells[i].index] = std::move(outcomes[i].record);
+  }
+
+  if (timing && !to_time.empty() && !stop()) {
+    std::vector<TimedCell> timed;
+    timed.reserve(to_time.size());
+    for (const PreparedCell* prepared : to_time) timed.push_back({prepared->cell, prepared->scene.get(), prepared->kernel.get()});
+    const auto times = time_cells(timed, plan.timing, stop, [&](double fraction) { observer.timing(fraction); });
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      CellRecord& record = records[to_time[i]->index];
+      record.time = times[i];
+      if (!times[i]) continue;
+      record.time->majorant_build_seconds = to_time[i]->scene->majorant->build_seconds;
+      observer.cell_timed(record);
+    }
+  }
+  if (effort.working > 0) {
+    observer.verdict_share(effort.judging / (effort.working - effort.judging));
+    observer.statistics_share(effort.statistics / (effort.working - effort.statistics));
+  }
+  std::vector<CellRecord> result;
+  result.reserve(records.size());
+  for (auto& [index, record] : records) result.push_back(std::move(record));
+  return result;
+}
+
+}  // namespace nullmark

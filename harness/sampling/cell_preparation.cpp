@@ -1,0 +1,210 @@
+#include "harness/sampling/cell_preparation.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for_each.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/kernel/path_kernel.h"
+#include "harness/model/names.h"
+#include "harness/registry/components.h"
+#include "harness/sampling/ray_memory.h"
+
+namespace nullmark {
+namespace {
+
+/// Adds the component's JSON pointer to what its construction complains of.
+template <class F>
+auto located(const std::string& pointer, F&& f) {
+  try {
+    return f();
+  } catch (const ParameterError& error) {
+    throw ParameterError(error.parameter.empty() ? pointer : pointer + "/" + error.parameter, error.what());
+  }
+}
+
+/// Flights in float are told to 2^-24 of the ray's depth: here still a thousandth of a mean free path.
+constexpr Real kDeepestSingle = 1 << 14;
+/// Of a medium from its frame's origin, in its own sizes: its inside is still told to 2^-14.
+constexpr Real kFarthestSingle = 1 << 10, kFarthestDouble = 0x1p39;
+
+template <class Key, class Value, class Make>
+std::shared_ptr<const Value> once(std::map<Key, std::shared_ptr<const Value>>& cache, const Key& key, Make&& make) {
+  std::shared_ptr<const Value>& entry = cache[key];
+  if (!entry) entry = make();
+  return entry;
+}
+
+}  // namespace
+
+PreparedCell Workshop::prepare(std::size_t index) {
+  const Cell& cell = plan_.cells[index];
+  PreparedCell prepared;
+  prepared.cell = &cell;
+  prepared.index = index;
+  prepared.samples_per_ray = cell.samples_per_ray;
+  const MediumSpec& spec = plan_.media[cell.medium];
+  if (const auto missing = missing_.find(cell.medium); missing != missing_.end()) {
+    prepared.reason = missing->second;
+    return prepared;
+  }
+  try {
+    prepared.scene = scene(cell);
+  } catch (const MissingData& error) {
+    if (!spec.optional)
+      throw ParameterError(spec.field.pointer + "/file",
+                           std::string(error.what()) + "; say \"optional\": true to skip such cells");
+    prepared.reason = missing_[cell.medium] = error.what();
+    return prepared;
+  }
+  const auto source = located(cell.estimator.pointer, [&] { return make_estimator(cell.estimator); });
+  located(cell.estimator.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
+  prepared.claim = source->claim(cell.quantity);
+  prepared.range = source->range(prepared.scene->medium->medium->channels());
+  prepared.needs_bound = source->needs_bound();
+  if (cell.quantity == Quantity::radiance && cell.precision == Precision::float64) {
+    add_light(prepared, *source);
+  } else {
+    prepared.kernel = source->kernel(prepared.scene->medium->medium->channels(), cell.precision);
+    prepared.reason = why_not(cell, *prepared.scene, prepared.kernel.get());
+  }
+  if (prepared.reason.empty())
+    prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity, cell.reference);
+  return prepared;
+}
+
+/// The kernel of a radiance, composed from the scene's effects.
+void Workshop::add_light(PreparedCell& prepared, const EstimatorSource& source) const {
+  const Cell& cell = *prepared.cell;
+  const TransportScene light = located(plan_.media[cell.medium].field.pointer, [&] {
+    return make_transport_scene(plan_.media[cell.medium], *prepared.scene->medium, prepared.scene->majorant->structure,
+                                cell.transport);
+  });
+  const Effects effects = cell.transport.general ? Effects{} : effects_of(light);
+  prepared.effects = effect_names(effects);
+  prepared.reason = brightest(light) > 0 ? why_no_paths(source, light, cell.transport.general)
+                                         : "nothing emits; give \"environment\", \"emission\" or the \"radiance\" of surfaces";
+  if (!prepared.reason.empty()) return;
+  prepared.takes_part = effects.heterogeneous;
+  prepared.kernel = make_path_kernel(source, light, cell.transport.general);
+  // A path whose flights have weight 1 carries the radiance of one place; with next events it adds up several.
+  const bool one_place = (prepared.range == SampleRange::binary || prepared.range == SampleRange::unit) &&
+                         light.options.next_event == NextEvent::off && light.medium->channels() == 1 &&
+                         prepared.scene->bounding && brightest(light) <= 1;
+  prepared.range = one_place                                 ? SampleRange::unit
+                   : prepared.range == SampleRange::any_sign ? SampleRange::any_sign
+                                                             : SampleRange::non_negative;
+}
+
+std::string Workshop::why_not(const Cell& cell, const Scene& scene, const Kernel* made) {
+  const int channels = scene.medium->medium->channels();
+  if (!made)
+    return channels > 1 ? fmt::format("{} channels have no form in float; expected precision \"double\"", channels)
+                        : fmt::format("{} has no form in float; expected precision \"double\"", cell.estimator.type);
+  const Kernel& kernel = *made;
+  if (!kernel.answers(cell.quantity))
+    return fmt::format("{} does not answer {}{}", cell.estimator.type, to_string(cell.quantity),
+                       cell.precision == Precision::float32 ? " in float" : "");
+  const bool single = cell.precision == Precision::float32;
+  const Box box = scene.medium->medium->bounds();
+  const Real farthest = single ? kFarthestSingle : kFarthestDouble;
+  if (box.lo.cwiseAbs().cwiseMax(box.hi.cwiseAbs()).maxCoeff() > farthest * box.extent().minCoeff())
+    return fmt::format(
+        "the medium lies over {:g} times its size from the origin of its frame, where {} has no digits for a position; expected "
+        "it "
+        "nearer{}",
+        farthest, single ? "float" : "double", single ? ", or \"double\"" : "");
+  if (const Real depth = single ? deepest_majorant(scene) : 0; depth > kDeepestSingle)
+    return fmt::format("rays of majorant depth {:.6g} leave float no digits for a flight; expected at most {}, or \"double\"",
+                       depth, kDeepestSingle);
+  if (kernel.needs_knots() && !scene.medium->medium->polynomial_degree())
+    return "no exact traversal: the medium is not polynomial between knots";
+  if (kernel.needs_optical_depth() && scene.reference->method != "closed_form")
+    return "the medium has no closed-form optical depth";
+  return "";
+}
+
+Real Workshop::deepest_majorant(const Scene& scene) {
+  const auto [known, fresh] = deepest_.try_emplace(&scene, 0);
+  if (!fresh) return known->second;
+  Real& deepest = known->second;
+  SegmentBuffer buffer;
+  Rates rates;
+  for (std::size_t ray = 0; ray < scene.rays->world.size(); ++ray) {
+    scene.majorant->structure->segments(scene.rays->world[ray], scene.rays->local[ray], buffer);
+    rates.start(scene.rays->world[ray].begin);
+    for (const Segment& segment : buffer.segments) rates.append(segment.end, segment.majorant);
+    deepest = std::max(deepest, rates.total_depth());
+  }
+  return deepest;
+}
+
+std::shared_ptr<const Scene> Workshop::scene(const Cell& cell) {
+  const bool told_at_marks = cell.quantity == Quantity::transmittance_profile || cell.quantity == Quantity::free_path;
+  const std::size_t kind = told_at_marks ? static_cast<std::size_t>(cell.quantity) : 0;
+  // Surfaces end rays; a radiance looks for them itself, along every leg of its paths.
+  const std::vector<SurfaceSpec> surfaces =
+      cell.quantity == Quantity::radiance ? std::vector<SurfaceSpec>{} : cell.transport.surfaces;
+  const std::size_t cut = static_cast<std::size_t>(std::find(cuts_.begin(), cuts_.end(), surfaces) - cuts_.begin());
+  if (cut == cuts_.size()) cuts_.push_back(surfaces);
+  return once(scenes_, std::array{cell.medium, cell.majorant, cell.rays, kind, cut}, [&] {
+    const auto medium = once(media_, cell.medium, [&] {
+      return located(plan_.media[cell.medium].field.pointer,
+                     [&] { return std::make_shared<const BuiltMedium>(build_medium(plan_.media[cell.medium])); });
+    });
+    const Component& majorant = plan_.majorants[cell.majorant];
+    const auto structure = once(structures_, std::array{cell.medium, cell.majorant}, [&] {
+      return located(majorant.pointer, [&] { return std::make_shared<const BuiltMajorant>(build_majorant(majorant, *medium)); });
+    });
+    const Component& set = plan_.ray_sets[cell.rays];
+    const auto rays = once(rays_, std::array{cell.medium, cell.rays, cut}, [&] {
+      return located(set.pointer, [&] {
+        return std::make_shared<const BuiltRays>(cut_at(build_surfaces(surfaces, 1), build_rays(set, *medium)));
+      });
+    });
+    const auto reference = once(references_, std::array{cell.medium, cell.rays, cut},
+                                [&] { return std::make_shared<const Reference>(compute_reference(*medium, *rays)); });
+    std::shared_ptr<const Marks> marks;
+    if (told_at_marks)
+      marks = once(marks_, std::array{cell.medium, cell.rays, kind, cut},
+                   [&] { return std::make_shared<const Marks>(compute_marks(*medium, *rays, cell.quantity)); });
+    const bool bounding = bounds_everywhere(*structure->structure, *rays);
+    const bool exceeds = !bounding && exceeds_somewhere(*medium, *structure->structure, *rays);
+    return std::make_shared<const Scene>(Scene{medium, structure, rays, reference, marks, bounding, exceeds});
+  });
+}
+
+std::vector<PreparedCell> prepare_all(Workshop& workshop, const Plan& plan, const std::function<bool(std::size_t)>& wanted) {
+  expect_rays_fit(plan, wanted);
+  std::vector<PreparedCell> cells;
+  for (std::size_t i = 0; i < plan.cells.size(); ++i)
+    if (wanted(i)) cells.push_back(workshop.prepare(i));
+  return cells;
+}
+
+void add_theory(std::vector<PreparedCell>& cells) {
+  std::map<const Scene*, std::vector<PreparedCell*>> by_scene;
+  for (PreparedCell& prepared : cells) {
+    const bool plain = prepared.cell->measurement == Measurement{};
+    if (prepared.reason.empty() && plain && prepared.kernel->states_theory()) by_scene[prepared.scene.get()].push_back(&prepared);
+  }
+  tbb::parallel_for_each(by_scene.begin(), by_scene.end(), [](auto& entry) {
+    auto& [scene, members] = entry;
+    std::vector<TheoryQuery> queries;
+    for (const PreparedCell* member : members)
+      queries.push_back({member->kernel.get(), member->cell->quantity, member->range, &member->targets});
+    const std::vector<CellTheory> theory = compute_theory(*scene, queries);
+    for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
+  });
+  for (PreparedCell& prepared : cells) {
+    if (!prepared.cell->equal_lookups || !prepared.reason.empty()) continue;
+    if (!prepared.theory.lookups || !(*prepared.theory.lookups > 0))
+      prepared.reason = "equal_lookups needs an estimator and medium with known expected lookups above 0";
+    else
+      prepared.samples_per_ray = std::max<std::uint64_t>(
+          1, static_cast<std::uint64_t>(std::llround(*prepared.cell->equal_lookups / *prepared.theory.lookups)));
+  }
+}
+
+}  // namespace nullmark

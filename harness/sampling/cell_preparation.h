@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "harness/sampling/theory.h"
+
+namespace nullmark {
+
+/// A cell with all that it samples from; `reason` is set where it cannot run.
+struct PreparedCell {
+  const Cell* cell = nullptr;
+  std::size_t index = 0;
+  std::shared_ptr<const Scene> scene;
+  std::shared_ptr<const Kernel> kernel;
+  std::string reason;
+  std::vector<std::string> effects;  ///< of a radiance
+  bool takes_part = true;            ///< false: flights are closed forms, whatever the estimator
+  Targets targets;
+  CellTheory theory;
+  std::uint64_t samples_per_ray = 0;
+  Claim claim = Claim::unbiased;
+  SampleRange range = SampleRange::any_sign;
+  bool needs_bound = false;
+
+  Cell planned() const {
+    Cell planned = *cell;
+    planned.samples_per_ray = samples_per_ray;
+    return planned;
+  }
+};
+
+/// Builds media, majorant structures, rays and references once each, on demand.
+class Workshop {
+ public:
+  explicit Workshop(const Plan& plan) : plan_(plan) {}
+
+  /// A cell of the plan, by its place there, all but its theory.  Throws ParameterError (with a JSON pointer as `parameter`) for
+  /// specifications that do not fit their medium.
+  PreparedCell prepare(std::size_t index);
+
+ private:
+  void add_light(PreparedCell& prepared, const EstimatorSource& source) const;
+  std::string why_not(const Cell& cell, const Scene& scene, const Kernel* made);
+  Real deepest_majorant(const Scene& scene);
+  std::shared_ptr<const Scene> scene(const Cell& cell);
+
+  const Plan& plan_;
+  std::map<std::size_t, std::string> missing_;
+  std::map<std::size_t, std::shared_ptr<const BuiltMedium>> media_;
+  std::map<std::array<std::size_t, 2>, std::shared_ptr<const BuiltMajorant>> structures_;
+  std::vector<std::vector<SurfaceSpec>> cuts_;  ///< that end rays
+  std::map<std::array<std::size_t, 3>, std::shared_ptr<const BuiltRays>> rays_;
+  std::map<std::array<std::size_t, 3>, std::shared_ptr<const Reference>> references_;
+  std::map<std::array<std::size_t, 4>, std::shared_ptr<const Marks>> marks_;
+  std::map<std::array<std::size_t, 5>, std::shared_ptr<const Scene>> scenes_;
+  std::map<const Scene*, Real> deepest_;  ///< majorant depth of a ray, where it was asked for
+};
+
+/// The cells of a plan that `wanted` picks, by their place there.
+std::vector<PreparedCell> prepare_all(Workshop& workshop, const Plan& plan, const std::function<bool(std::size_t)>& wanted);
+
+/// Theory of all cells that can run, scene by scene; a measurement stage changes the law of the samples, so those cells have
+/// none. Where samples are planned by lookups, their number follows from it.
+void add_theory(std::vector<PreparedCell>& cells);
+
+}  // namespace nullmark

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "harness/kernel/kernel.h"
+#include "harness/kernel/optical_depth.h"
+#include "harness/model/plan.h"
+#include "harness/registry/ray_sets.h"
+
+namespace nullmark {
+
+/// A medium, built, with its extrema and what its random streams are keyed by.
+struct BuiltMedium {
+  std::shared_ptr<const Medium> medium;
+  Extrema extrema;
+  Spectrum albedo;  ///< mu_s / mu per channel
+  Box world_bounds;
+  std::uint64_t hash = 0;  ///< of the specification and of the data behind it
+};
+
+/// A value for all channels or one each, as many as there are; none: 0.  Throws ParameterError, naming `what`.
+Spectrum per_channel(const std::vector<Real>& values, int channels, const char* what);
+
+/// Builds a specification: the field, times its spectrum or one per channel.  Throws ParameterError or MissingData.
+BuiltMedium build_medium(const MediumSpec& spec);
+
+/// A majorant structure, with the wall time that building it took.
+struct BuiltMajorant {
+  std::shared_ptr<const MajorantStructure> structure;
+  double build_seconds = 0;
+};
+
+/// Throws ParameterError where the structure does not fit the medium.
+BuiltMajorant build_majorant(const Component& spec, const BuiltMedium& medium);
+
+/// Rays of a set, cut to a medium, in both frames.
+struct BuiltRays {
+  std::vector<Ray> world, local;
+  int width = 0, height = 0;
+};
+BuiltRays build_rays(const Component& spec, const BuiltMedium& medium);
+
+/// Optical depth of every ray, per channel, with a bound on its error.
+struct Reference {
+  int channels = 1;
+  std::vector<Real> depth, error;  ///< [ray * channels + c]
+  std::string method;              ///< "closed_form", "exact_traversal" or "quadrature"
+
+  Spectrum at(std::size_t ray) const {
+    return Eigen::Map<const Spectrum>(&depth[ray * static_cast<std::size_t>(channels)], channels);
+  }
+};
+Reference compute_reference(const BuiltMedium& medium, const BuiltRays& rays);
+
+/// Distances on every ray with the exact optical depth from the ray's begin to each, and a bound on its error.
+struct Marks {
+  std::size_t per_ray = 0;
+  std::vector<Real> distance;      ///< [ray * per_ray + j], ascending
+  std::vector<Real> depth, error;  ///< [(ray * per_ray + j) * channels + c]
+};
+
+/// kProfileMarks marks at equal distances up to the ray's end (transmittance_profile), or the kFreePathCells + 1 ends of cells in
+/// which a collision is about equally probable (free_path).
+Marks compute_marks(const BuiltMedium& medium, const BuiltRays& rays, Quantity quantity);
+
+/// What one cell samples from: shared by all cells of the same medium, majorant and rays.
+struct Scene {
+  std::shared_ptr<const BuiltMedium> medium;
+  std::shared_ptr<const BuiltMajorant> majorant;
+  std::shared_ptr<const BuiltRays> rays;
+  std::shared_ptr<const Reference> reference;
+  std::shared_ptr<const Marks> marks;  ///< of quantities that are told at distances; null otherwise
+  bool bounding = true;                ///< the majorant bounds the extinction in every segment of every ray
+  bool exceeds_bound = false;          ///< the extinction was seen above the majorant at a point of a ray
+
+  /// Fills the context of a ray with what the kernel needs.
+  void context(std::size_t ray, const Kernel& kernel, RayContext& out) const;
+};
+
+/// Whether the majorant bounds the extinction in every segment of every ray.
+bool bounds_everywhere(const MajorantStructure& majorant, const BuiltRays& rays);
+
+/// Whether the extinction exceeds the majorant at one of several points of every piece between the medium's knots and the
+/// segments' ends: then it does not bound, whatever samples happen to meet.
+bool exceeds_somewhere(const BuiltMedium& medium, const MajorantStructure& majorant, const BuiltRays& rays);
+
+/// Key of the random streams: the same for all estimators of a medium and seed, unless the cell asks for streams of its own.
+std::uint64_t stream_key(const Cell& cell, const BuiltMedium& medium);
+
+}  // namespace nullmark

@@ -1,0 +1,376 @@
+#include "harness/sampling/test_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <cmath>
+#include <limits>
+
+namespace nullmark {
+namespace {
+
+/// Numbers below have fewer digits than others.
+Real least_of(Precision precision) {
+  return precision == Precision::float64 ? std::numeric_limits<Real>::min() : Real{std::numeric_limits<float>::min()};
+}
+
+/// What single precision may add to a mean: every factor of a weight is off by a few units in its last place, and all of them
+/// may be so to the same side, and numbers below the least normal one have no digits left.
+Real single_error(const Cell& cell, Real mean, Real lookups) {
+  if (cell.precision == Precision::float64) return 0;
+  return 2 * epsilon_of(cell.precision) * std::abs(mean) * (1 + lookups) + least_of(cell.precision);
+}
+
+/// Of epsilon, what rounding may take of a sample.
+constexpr Real kNoBias = 1e-9;
+
+/// Where the standard deviation is a millionth of rounding, no sample in 10^12 shows it, whatever its law [Chebyshev].
+constexpr Real kSurely = 1e-12;
+
+/// A pilot variance is trusted for unbounded samples only below this variance of the variance.
+constexpr Real kTrustedVariance = 0.02;
+
+/// A pilot's variance of lookups is trusted from so many samples, and so many lookups among them, on: flights are at most as
+/// heavy in the tail as an exponential (variance of the variance 8/n), and lookups that are rare as a Poisson number (1/lookups).
+constexpr std::uint64_t kTellingLookups = 400;
+
+/// Margin of the groups over that of all rays: as many standard errors as in the pooled test.
+const Real kGroupMargin = std::sqrt(static_cast<Real>(kRayGroups));
+
+/// The relative margin where the configuration names none, wider where depth makes samples noisier.
+Real default_epsilon(Real transmittance) {
+  if (transmittance > std::exp(-2.)) return 0.01;
+  if (transmittance > std::exp(-5.)) return 0.02;
+  return transmittance > 1e-4 ? 0.05 : 0.5;
+}
+
+/// Absolute margin of the scores of a free path, of all flights, and the least of it.
+constexpr Real kOfFlights = 2e-3, kRareScore = 1e-4;
+
+/// Smaller where a score is rare, or nearly always given, or a tracker that never scores it would pass.  A weight's mean is 1.
+Real score_epsilon(const Cell& cell, Real mean) {
+  constexpr Real kOfScore = 0.25, kNever = 1e-9;
+  const Real margin = cell.gate.epsilon.value_or(kOfFlights), rare = std::min(mean, 1 - mean);
+  return rare < kNever ? margin : std::max(std::min(margin, kOfScore * rare), kRareScore);
+}
+
+/// Absolute margin of an output.  Where hardly anything is absorbed it shrinks with 1 - T, or a tracker that sees no medium at
+/// all would pass.
+Real absolute_epsilon(const Cell& cell, Real mean) {
+  if (cell.quantity == Quantity::free_path) return score_epsilon(cell, mean);
+  // A mean that has underflowed has no part of itself.
+  const Real least = 16 * least_of(cell.precision);
+  if (!(std::abs(mean) > least)) return least;
+  if (cell.gate.epsilon) return *cell.gate.epsilon * mean;
+  if (cell.quantity == Quantity::optical_depth || cell.quantity == Quantity::radiance) return 0.01 * std::abs(mean);
+  const Real margin = default_epsilon(mean) * mean, absorbed = 1 - mean;
+  constexpr Real kOfAbsorbed = 0.1;
+  return absorbed > 1e-12 ? std::min(margin, kOfAbsorbed * absorbed) : margin;
+}
+
+/// What the rays of one test have in common.
+struct Pool {
+  Real mean = 0, variance = 0, reference_error = 0, least = kInfinity, most = -kInfinity;
+  std::size_t rays = 0;
+};
+
+/// Normal quantile of the chance at which a test is planned; the chance that a test of the whole configuration stays undecided
+/// where a decision counts as sure.
+constexpr Real kPlannedPower = 1.645, kUnsure = 1e-3;
+
+std::uint64_t per_ray(Real samples, std::size_t rays) {
+  const Real each = std::ceil(samples / static_cast<Real>(rays));
+  return each < 9e15 ? static_cast<std::uint64_t>(each) : std::uint64_t{1} << 53;
+}
+
+std::uint64_t largest_power_of_two_divisor(std::uint64_t n) { return n & (~n + 1); }
+
+}  // namespace
+
+std::vector<int> ray_groups(const BuiltRays& rays) {
+  const std::size_t n = rays.world.size();
+  std::vector<int> groups(n, 0);
+  if (n < static_cast<std::size_t>(kRayGroups)) return groups;
+  constexpr int kTiles = 4;
+  static_assert(kTiles * kTiles == kRayGroups);
+  const bool tiles = rays.width >= kTiles && rays.height >= kTiles;
+  for (std::size_t r = 0; r < n; ++r) {
+    if (tiles) {
+      const auto width = static_cast<std::size_t>(rays.width), height = static_cast<std::size_t>(rays.height);
+      groups[r] = static_cast<int>((r / width) * kTiles / height * kTiles + (r % width) * kTiles / width);
+    } else {
+      groups[r] = static_cast<int>(r * kRayGroups / n);
+    }
+  }
+  return groups;
+}
+
+void MeanTest::place(std::vector<std::pair<Role, Bet>> placed) {
+  bets = std::move(placed);
+  basis = basis_of(bets);
+  sum_lengths.clear();
+  for (const auto& [role, bet] : bets) sum_lengths.push_back(bet.errors_per_sum);
+  std::sort(sum_lengths.begin(), sum_lengths.end());
+  sum_lengths.erase(std::unique(sum_lengths.begin(), sum_lengths.end()), sum_lengths.end());
+  if (sum_lengths.empty()) sum_lengths.push_back(1);
+}
+
+namespace {
+
+/// Plans the tests of one cell.
+class GatePlanner {
+ public:
+  GatePlanner(const Cell& cell, const Scene& scene, const Targets& targets, Claim claim, const CellTheory& theory,
+              const std::optional<Pilot>& pilot, const TestLevels& levels)
+      : cell_(cell), targets_(targets), theory_(theory), pilot_(pilot), levels_(levels), rays_(scene.rays->world.size()) {
+    const bool own_mean = claim == Claim::consistent || claim == Claim::biased;
+    gate_.against = own_mean ? "own mean" : "reference";
+    gate_.group_of = ray_groups(*scene.rays);
+    gate_.shift.assign(rays_ * targets.outputs, 0);
+    if (own_mean && !theory.ray_shift.empty()) gate_.shift = theory.ray_shift;
+    analytic_ = !theory.ray_variance.empty();
+    gate_.variance_basis = analytic_ ? "analytic" : pilot ? "pilot" : "none";
+    // A free path is drawn, whatever its law is known by.
+    exact_ = claim == Claim::exact && cell.quantity != Quantity::free_path && cell.quantity != Quantity::radiance;
+    most_per_sum_ = static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
+    gate_.longest_sum = static_cast<std::uint64_t>(most_per_sum_);
+    mean_lookups_ = theory.lookups.value_or(pilot && pilot->samples > 0
+                                                ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples)
+                                                : theory.majorant_depth);
+  }
+
+  CellGate plan(SampleRange range, bool bounding) {
+    state_range(range, bounding);
+    allow();
+    if (!analytic_ && !pilot_ && !exact_) return std::move(gate_);
+    for (std::size_t o = 0; o < targets_.outputs; ++o) add_means(o);
+    judge_plan();
+    add_lookups();
+    add_variances(range, bounding);
+    return std::move(gate_);
+  }
+
+ private:
+  /// Where the majorant does not bound, ranges that rest on it are not claimed.
+  void state_range(SampleRange range, bool bounding) {
+    if (cell_.quantity == Quantity::optical_depth || (!bounding && range != SampleRange::binary)) range = SampleRange::any_sign;
+    if (range != SampleRange::any_sign) gate_.low = 0;
+    if (range == SampleRange::binary || range == SampleRange::unit) gate_.high = 1;
+  }
+
+  /// What the configuration lets a ray cost.
+  void allow() {
+    const std::uint64_t n = cell_.samples_per_ray, most = std::max(n, cell_.gate.max_samples_per_ray);
+    gate_.affordable = most;
+    gate_.allowance = cell_.gate.max_samples_per_ray == 0 ? kPatience * n : most;
+    if (!cell_.gate.max_lookups_per_ray || !(mean_lookups_ > 0)) return;
+    const auto paid = static_cast<std::uint64_t>(std::min<Real>(9e15, *cell_.gate.max_lookups_per_ray / mean_lookups_));
+    gate_.affordable = std::max(n, std::min(most, paid));
+    gate_.allowance = std::max(n, std::min(gate_.allowance, paid));
+  }
+
+  /// A pilot's variance is trusted for bets that rest on it where samples have no range and their variance showed no heavy tail.
+  ErrorLaw::Basis basis() const {
+    if (analytic_) return ErrorLaw::Basis::analytic;
+    const bool trusted = pilot_ && !theory_.infinite_variance && pilot_->variance_of_variance < kTrustedVariance;
+    return trusted ? ErrorLaw::Basis::pilot : ErrorLaw::Basis::none;
+  }
+
+  /// Over all rays, then over each group of them.
+  std::vector<Pool> pools(std::size_t output) const {
+    std::vector<Pool> pools(rays_ < static_cast<std::size_t>(kRayGroups) ? 1 : 1 + kRayGroups);
+    for (std::size_t ray = 0; ray < rays_; ++ray) {
+      const std::size_t at = ray * targets_.outputs + output;
+      const Real mean = targets_.mean[at] + gate_.shift[at];
+      const auto add = [&](Pool& pool) {
+        ++pool.rays;
+        pool.mean += mean;
+        pool.variance += analytic_ ? theory_.ray_variance[at] : pilot_ ? pilot_->variance[at] : 0;
+        pool.reference_error += targets_.error[at];
+        pool.least = std::min(pool.least, mean);
+        pool.most = std::max(pool.most, mean);
+      };
+      add(pools[0]);
+      if (pools.size() > 1) add(pools[static_cast<std::size_t>(gate_.group_of[ray]) + 1]);
+    }
+    for (Pool& pool : pools) pool.mean /= static_cast<Real>(pool.rays);
+    return pools;
+  }
+
+  void add_means(std::size_t output) {
+    const std::vector<Pool> pools = this->pools(output);
+    const Real epsilon = absolute_epsilon(cell_, pools[0].mean);
+    for (std::size_t g = 0; g < pools.size(); ++g) {
+      const Pool& pool = pools[g];
+      const auto n = static_cast<Real>(pool.rays);
+      MeanTest test;
+      test.channel = static_cast<int>(output);
+      test.group = static_cast<int>(g) - 1;
+      test.rays = pool.rays;
+      test.reference = pool.mean;
+      test.epsilon = g == 0 ? epsilon : epsilon * kGroupMargin;
+      test.reference_error = pool.reference_error / n + single_error(cell_, pool.mean, mean_lookups_);
+      test.variance = pool.variance / n;
+      // A few hundred samples of one group may lack the rare events that its variance is made of; those of all rays have them.
+      if (!analytic_) test.variance = std::max(test.variance, pools[0].variance / static_cast<Real>(pools[0].rays));
+      const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0, ulp = epsilon_of(cell_.precision);
+      test.rounding = std::max(64 * ulp * (1 + mean_lookups_ + depth) * std::max(std::abs(pool.most), std::abs(pool.least)),
+                               least_of(cell_.precision));
+      // Trackers that divide by the chance of a rare event enlarge rounding; a billionth of epsilon is no bias.
+      test.rounding = std::max(test.rounding, kNoBias * test.epsilon);
+      // Rare events that a pilot did not see are no proof of a zero variance.
+      test.deterministic = exact_ || (analytic_ && !(test.variance > kSurely * test.rounding * test.rounding));
+      if (!analytic_ && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
+      // Far below epsilon a variance decides nothing, and theory's may be rounding.
+      if (!test.deterministic) test.variance = std::max(test.variance, test.epsilon * test.epsilon / 4);
+      place(test, {pool.most - gate_.low, gate_.high - pool.least, test.variance, basis(), test.reference_error});
+      demand(test, pool);
+      gate_.tests.push_back(std::move(test));
+    }
+  }
+
+  void place(MeanTest& test, const ErrorLaw& law) {
+    if (test.deterministic) {
+      test.basis = "deterministic";
+      return;
+    }
+    // A bias far beyond epsilon shows in the mean of all rays, or it is one of some groups that the others hide.
+    const bool pooled = test.channel != MeanTest::kLookups && test.group == MeanTest::kAllRays;
+    test.place(place_bets(law, test.epsilon, pooled ? cell_.samples_per_ray * rays_ : 0, most_per_sum_));
+    const auto needed = [&](Real power) {
+      return per_ray(errors_to_pass(test.bets, law, test.epsilon, levels_.alpha_pass, power), test.rays);
+    };
+    test.planned = needed(kPlannedPower);
+    // The chance that all tests are decided is no less than 1 minus the sum of the others.
+    test.sure = needed(boost::math::quantile(complement(boost::math::normal(), kUnsure / static_cast<Real>(levels_.tests))));
+  }
+
+  /// What the test of a mean asks of the cell.
+  void demand(const MeanTest& test, const Pool& pool) {
+    if (test.reference_error > 0.25 * test.epsilon)
+      gate_.undecidable =
+          fmt::format("the reference's own error {:.2g} is too coarse for epsilon {:.2g}", test.reference_error, test.epsilon);
+    if (test.deterministic || test.basis == "none") return;
+    gate_.planned = std::max(gate_.planned, test.planned);
+    if (test.sure <= sure_) return;
+    sure_ = test.sure;
+    // Relative to a mean that has underflowed nothing can be said.
+    const Real mean = std::max(std::abs(pool.mean), least_of(cell_.precision));
+    needs_ = fmt::format("not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} (relative variance {:.2g})",
+                         gate_.affordable, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
+    tight_ = fmt::format(
+        "perhaps not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} with a chance of .95, and {:.2g} to be "
+        "sure",
+        gate_.allowance, test.epsilon / mean, static_cast<double>(test.planned), static_cast<double>(test.sure));
+  }
+
+  /// Whether the samples allowed decide the mean, and what is missing where they do not.
+  void judge_plan() {
+    const bool one_sided = std::any_of(gate_.tests.begin(), gate_.tests.end(), [](const MeanTest& test) {
+      const auto has = [&](Role role) {
+        return std::any_of(test.bets.begin(), test.bets.end(), [&](const auto& placed) { return placed.first == role; });
+      };
+      return !test.deterministic && !(has(Role::low) && has(Role::high));
+    });
+    if (one_sided) {
+      gate_.undecidable =
+          theory_.infinite_variance
+              ? "the variance is infinite: no number of samples decides the mean"
+              : fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
+                            pilot_->variance_of_variance);
+      if (!theory_.infinite_variance)
+        gate_.remedies = "state a range of the samples (kRange), their variance (theory), or the guarantee \"exact\"";
+    } else if (gate_.undecidable.empty() && sure_ > gate_.allowance) {
+      gate_.undecidable = gate_.planned > gate_.affordable ? needs_ : tight_;
+    }
+  }
+
+  /// The same machinery for what a sample costs.
+  void add_lookups() {
+    const bool known_spread = !theory_.ray_lookups_variance.empty();
+    if (theory_.ray_lookups.empty() || !(known_spread || pilot_)) return;
+    gate_.lookups = theory_.ray_lookups;
+    Pool pool;
+    for (std::size_t ray = 0; ray < rays_; ++ray) {
+      pool.mean += theory_.ray_lookups[ray];
+      pool.variance += known_spread ? theory_.ray_lookups_variance[ray] : pilot_->lookups_variance[ray];
+      pool.least = std::min(pool.least, theory_.ray_lookups[ray]);
+      pool.most = std::max(pool.most, theory_.ray_lookups[ray]);
+    }
+    const auto n = static_cast<Real>(rays_);
+    MeanTest test;
+    test.channel = MeanTest::kLookups;
+    test.rays = rays_;
+    test.reference = pool.mean / n;
+    constexpr Real kCostEpsilon = 0.01;
+    // Expected lookups come from a quadrature as well.
+    constexpr Real kTheoryError = 1e-6;
+    // Below one lookup a sample a hundredth of a standard deviation is as much as anybody asks for.
+    test.epsilon = kCostEpsilon * std::max(pool.mean / n, std::sqrt(pool.variance / n));
+    test.reference_error = kTheoryError * pool.mean / n;
+    test.variance = pool.variance / n;
+    test.rounding = test.reference_error;
+    const bool seen = known_spread || std::min(pilot_->samples, pilot_->lookups) >= kTellingLookups;
+    // Numbers of lookups are not negative: where none is expected every sample makes none.
+    test.deterministic = !(pool.most > 0) || (seen && !(test.variance > kSurely * test.rounding * test.rounding));
+    // Numbers of lookups are whole: a mean between two of them varies by at least so much.
+    if (!seen) test.variance = std::max(test.variance, pool.mean / n * (1 - std::min<Real>(1, pool.mean / n)));
+    using Basis = ErrorLaw::Basis;
+    const Basis basis = known_spread ? Basis::analytic : seen ? Basis::pilot : Basis::none;
+    place(test, {pool.most, kInfinity, test.variance, basis, test.reference_error});
+    gate_.tests.push_back(std::move(test));
+  }
+
+  /// Tests of the variance that theory states, E[(X - mu0)^2] = v: from below for any samples, from above where they have a
+  /// range. Samples of 0 and 1 need none, their variance follows from their mean.
+  void add_variances(SampleRange range, bool bounding) {
+    if (!analytic_ || (range == SampleRange::binary && bounding)) return;
+    for (const MeanTest& mean : gate_.tests) {
+      if (mean.channel < 0 || mean.group != MeanTest::kAllRays || mean.deterministic) continue;
+      Real most = 0, highest = std::isfinite(gate_.high) ? 0 : kInfinity, total = 0, reference = 0;
+      for (std::size_t ray = 0; ray < rays_; ++ray) {
+        const std::size_t at = ray * targets_.outputs + static_cast<std::size_t>(mean.channel);
+        const Real v = theory_.ray_variance[at], mu = targets_.mean[at] + gate_.shift[at];
+        most = std::max(most, v);
+        total += v;
+        reference = std::max(reference, targets_.error[at]);
+        const Real far = std::max(gate_.high - mu, mu - gate_.low);
+        highest = std::max(highest, far * far - v);
+      }
+      // A variance near rounding is one of the tracker's arithmetic.
+      constexpr Real kAboveRounding = 1e4, kTheoryError = 2e-3;
+      if (!std::isfinite(reference) || !(total / static_cast<Real>(rays_) > kAboveRounding * mean.rounding * mean.rounding))
+        continue;
+      MeanTest test;
+      test.channel = mean.channel;
+      test.rays = rays_;
+      const Real slack = kTheoryError * most + reference * reference + mean.rounding * mean.rounding;
+      test.place(place_blind_bets({most, highest, 0, ErrorLaw::Basis::none, slack}, most_per_sum_));
+      gate_.variances.push_back(std::move(test));
+    }
+    if (!gate_.variances.empty()) gate_.stated_variance = theory_.ray_variance;
+  }
+
+  const Cell& cell_;
+  const Targets& targets_;
+  const CellTheory& theory_;
+  const std::optional<Pilot>& pilot_;
+  const TestLevels& levels_;
+  std::size_t rays_;
+  bool analytic_ = false, exact_ = false;
+  int most_per_sum_ = 1;
+  Real mean_lookups_ = 0;
+  std::uint64_t sure_ = 0;
+  std::string needs_, tight_;
+  CellGate gate_;
+};
+
+}  // namespace
+
+CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Claim claim,
+                   const CellTheory& theory, const std::optional<Pilot>& pilot, const TestLevels& levels) {
+  return GatePlanner(cell, scene, targets, claim, theory, pilot, levels).plan(range, scene.bounding);
+}
+
+}  // namespace nullmark

@@ -1,0 +1,251 @@
+#include "harness/sampling/timing.h"
+
+#include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "harness/model/names.h"
+#include "harness/sampling/reference_loops.h"
+#include "media/volumes/volume.h"
+
+namespace nullmark {
+namespace {
+
+constexpr std::size_t kRays = 64;  ///< at most this many, spread evenly over the cell's
+
+Real median(std::vector<Real> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return (*middle + *std::max_element(values.begin(), middle)) / 2;
+}
+
+std::vector<std::size_t> timed_rays(const BuiltRays& rays) {
+  std::vector<std::size_t> hits, chosen;
+  for (std::size_t r = 0; r < rays.local.size(); ++r)
+    if (rays.local[r].length() > 0) hits.push_back(r);
+  const std::size_t count = std::min(kRays, hits.size());
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(hits[(2 * i + 1) * hits.size() / (2 * count)]);
+  return chosen;
+}
+
+struct Repetition {
+  Real ns_per_iteration = 0, samples = 0, lookups = 0;
+  Real waiting = 0;  ///< see waiting_share
+};
+
+/// Google Benchmark 1.8 renamed `error_occurred` to `skipped`.
+template <class Run>
+bool was_skipped(const Run& run) {
+  if constexpr (requires { run.error_occurred; })
+    return run.error_occurred;
+  else
+    return static_cast<bool>(run.skipped);
+}
+
+class Collector final : public benchmark::BenchmarkReporter {
+ public:
+  Collector(const std::function<void(double)>& progress, std::size_t expected) : progress_(progress), expected_(expected) {}
+
+  bool ReportContext(const Context&) override { return true; }
+
+  void ReportRuns(const std::vector<Run>& runs) override {
+    for (const Run& run : runs) {
+      if (run.run_type != Run::RT_Iteration || was_skipped(run)) continue;
+      const auto iterations = static_cast<Real>(run.iterations);
+      all[run.run_name.function_name].push_back({run.real_accumulated_time / iterations * 1e9,
+                                                 run.counters.at("samples") / iterations, run.counters.at("lookups") / iterations,
+                                                 waiting_share(run.real_accumulated_time, run.cpu_accumulated_time)});
+      progress_(static_cast<double>(++seen_) / static_cast<double>(expected_));
+    }
+  }
+
+  std::map<std::string, std::vector<Repetition>> all;
+
+ private:
+  std::function<void(double)> progress_;
+  std::size_t expected_, seen_ = 0;
+};
+
+/// Names of the floors among the benchmarks.
+std::string floor_name(Precision precision) { return "floor/" + to_string(precision); }
+std::string memory_name(std::size_t bytes) { return fmt::format("memory/{}", bytes); }
+
+template <class T>
+void time_lane_floor(benchmark::State& state, std::uint64_t steps) {
+  auto streams = LaneRng<T, kNativeLanes<T>>::seeded({1, 2, 3});
+  volatile Real rate = 0.2;
+  for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(lane_floor_loop<T>(streams, rate, steps));
+}
+
+/// Memory of a volume's voxels; 0 for other media.
+std::size_t voxel_bytes(const Medium& medium) {
+  const auto* volume = dynamic_cast<const Volume*>(&medium);
+  return volume ? volume->data().values.bytes() : 0;
+}
+
+/// Nanoseconds per sample of each repetition.
+std::vector<Real> sample_times(const std::vector<Repetition>& repetitions) {
+  std::vector<Real> ns;
+  ns.reserve(repetitions.size());
+  for (const Repetition& repetition : repetitions) ns.push_back(repetition.ns_per_iteration / repetition.samples);
+  return ns;
+}
+
+BatchTime batch_time(std::uint64_t samples_per_traversal, const std::vector<Real>& ns) {
+  BatchTime batch{samples_per_traversal, median(ns), 0};
+  std::vector<Real> deviation;
+  deviation.reserve(ns.size());
+  for (const Real each : ns) deviation.push_back(std::abs(each - batch.ns_per_sample));
+  batch.mad = median(deviation);
+  return batch;
+}
+
+/// Leaves Google Benchmark altogether: 1.7 aborts when a benchmark is skipped in one of several interleaved repetitions.
+struct Interrupted {};
+
+/// Samples a cell's rays over and over; every iteration takes new samples, so that no branch pattern is learnt by heart.
+void run_cell(benchmark::State& state, const TimedCell& timed, const std::vector<std::size_t>& rays, std::uint64_t samples,
+              const std::function<bool()>& stop) {
+  const std::uint64_t key = stream_key(*timed.cell, *timed.scene->medium);
+  const Medium& medium = *timed.scene->medium->medium;
+  const auto workspace = timed.kernel->workspace();
+  RayContext context;
+  SampleBlock block;
+  Counters counters;
+  std::uint64_t first = 0;
+  if (stop()) throw Interrupted();
+  for ([[maybe_unused]] auto _ : state) {
+    for (const std::size_t ray : rays) {
+      timed.scene->context(ray, *timed.kernel, context);
+      timed.kernel->begin_ray(*workspace, medium, timed.scene->medium->extrema, context);
+      timed.kernel->sample(*workspace, medium, context, key, first, samples, timed.cell->quantity, block, counters);
+      benchmark::DoNotOptimize(block.values.data());
+      benchmark::ClobberMemory();
+    }
+    first += samples;
+  }
+  state.counters["samples"] = static_cast<double>(counters.samples);
+  state.counters["lookups"] = static_cast<double>(counters.lookups);
+}
+
+}  // namespace
+
+Real waiting_share(Real wall_seconds, Real thread_seconds) {
+  return wall_seconds > thread_seconds ? 1 - thread_seconds / wall_seconds : 0;
+}
+
+std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& plan,
+                                                  const std::function<bool()>& stop,
+                                                  const std::function<void(double)>& progress) {
+  static const bool initialised = [] {
+    char name[] = "nullmark", interleave[] = "--benchmark_enable_random_interleaving=true";
+    char* arguments[] = {name, interleave, nullptr};
+    int count = 2;
+    benchmark::Initialize(&count, arguments);
+    return true;
+  }();
+  (void)initialised;
+
+  std::vector<std::optional<TimeRecord>> result(cells.size());
+  if (cells.empty()) return result;
+  // Inputs of the loops are volatile: Google Benchmark 1.7's DoNotOptimize of a double that is written corrupts it under GCC.
+  const auto configure = [&](benchmark::internal::Benchmark* bench) {
+    bench->Repetitions(plan.repetitions)->MinTime(plan.seconds)->UseRealTime()->Unit(benchmark::kNanosecond);
+  };
+  const std::string loop_name = "loop";
+  std::size_t extra = 1;
+  const auto add_floor = [&](const std::string& name, auto run) {
+    ++extra;
+    configure(benchmark::RegisterBenchmark(name.c_str(), [run](benchmark::State& state) {
+      constexpr std::uint64_t kSteps = 4096;
+      run(state, kSteps);
+      state.counters["samples"] = static_cast<double>(state.iterations());
+      state.counters["lookups"] = static_cast<double>(static_cast<std::uint64_t>(state.iterations()) * kSteps);
+    }));
+  };
+  add_floor(floor_name(Precision::float64), time_lane_floor<Real>);
+  add_floor(floor_name(Precision::float32), time_lane_floor<float>);
+  std::set<std::size_t> sizes;
+  for (const TimedCell& cell : cells)
+    if (const std::size_t bytes = voxel_bytes(*cell.scene->medium->medium); bytes > 0 && sizes.insert(bytes).second)
+      add_floor(memory_name(bytes), [bytes](benchmark::State& state, std::uint64_t steps) {
+        const std::vector<float> buffer(bytes / sizeof(float), 1.f);
+        std::uint64_t at = 0;
+        for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(memory_floor_loop(buffer, at, steps));
+      });
+  configure(benchmark::RegisterBenchmark(loop_name.c_str(), [](benchmark::State& state) {
+    PlainRng rng(2);
+    std::uint64_t lookups = 0, samples = 0;
+    volatile Real majorant = 30, extinction = 15;
+    for ([[maybe_unused]] auto _ : state) {
+      const Real mu = extinction;
+      for (int i = 0; i < 128; ++i)
+        benchmark::DoNotOptimize(plain_ratio_loop(
+            rng, majorant, [&](Real) { return mu; }, lookups));
+      samples += 128;
+    }
+    state.counters["samples"] = static_cast<double>(samples);
+    state.counters["lookups"] = static_cast<double>(lookups);
+  }));
+  const auto batch_name = [](std::size_t cell, std::uint64_t samples) { return fmt::format("{}/{}", cell, samples); };
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::vector<std::size_t> rays = timed_rays(*cells[i].scene->rays);
+    if (rays.empty()) continue;
+    for (const std::uint64_t samples : plan.samples_per_traversal)
+      configure(benchmark::RegisterBenchmark(
+          batch_name(i, samples).c_str(),
+          [&cells, &stop, rays, i, samples](benchmark::State& state) { run_cell(state, cells[i], rays, samples, stop); }));
+  }
+  const std::size_t benches = cells.size() * plan.samples_per_traversal.size() + extra;
+  Collector collector(progress, benches * static_cast<std::size_t>(plan.repetitions));
+  try {
+    benchmark::RunSpecifiedBenchmarks(&collector);
+  } catch (const Interrupted&) {
+    return result;
+  }
+  benchmark::ClearRegisteredBenchmarks();
+
+  const auto per_lookup = [&](const std::string& name) {
+    std::vector<Real> ns;
+    for (const Repetition& repetition : collector.all[name]) ns.push_back(repetition.ns_per_iteration / repetition.lookups);
+    return ns.empty() ? 0 : median(ns);
+  };
+  const Real loop = per_lookup(loop_name);
+  const auto whole = static_cast<std::size_t>(plan.repetitions);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::vector<Repetition>& repetitions = collector.all[batch_name(i, plan.samples_per_traversal.back())];
+    if (repetitions.size() != whole) continue;
+    TimeRecord time;
+    time.repetition_ns = sample_times(repetitions);
+    const BatchTime main = batch_time(plan.samples_per_traversal.back(), time.repetition_ns);
+    time.ns_per_sample = main.ns_per_sample;
+    time.mad = main.mad;
+    if (plan.samples_per_traversal.size() > 1)
+      for (const std::uint64_t samples : plan.samples_per_traversal)
+        if (const auto& of_batch = collector.all[batch_name(i, samples)]; of_batch.size() == whole)
+          time.batches.push_back(batch_time(samples, sample_times(of_batch)));
+    std::vector<Real> lookup_ns, waiting;
+    for (const Repetition& repetition : repetitions) waiting.push_back(repetition.waiting);
+    time.waiting = median(waiting);
+    for (const Repetition& repetition : repetitions)
+      if (repetition.lookups > 0) lookup_ns.push_back(repetition.ns_per_iteration / repetition.lookups);
+    if (!lookup_ns.empty()) {
+      time.ns_per_lookup = median(lookup_ns);
+      const auto ratio = [&](Real to) { return to > 0 ? time.ns_per_lookup / to : 0; };
+      time.floor_ratio = ratio(per_lookup(floor_name(cells[i].cell->precision)));
+      time.loop_ratio = ratio(loop);
+      if (const std::size_t bytes = voxel_bytes(*cells[i].scene->medium->medium); bytes > 0)
+        time.memory_ratio = ratio(per_lookup(memory_name(bytes)));
+    }
+    time.repetitions = plan.repetitions;
+    time.samples_per_traversal = plan.samples_per_traversal.back();
+    result[i] = time;
+  }
+  return result;
+}
+
+}  // namespace nullmark

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "media/base/types.h"
+
+namespace nullmark {
+
+/// A number with a 95 % interval around it; low == high where it is exact.
+struct Interval {
+  Real value = 0, low = 0, high = 0;
+
+  bool exact() const { return low == high; }
+};
+
+inline Interval exactly(Real value) { return {value, value, value}; }
+
+/// Quantile .975 of the normal distribution.
+inline constexpr Real kNormal975 = 1.959963984540054;
+
+/// value >= 0 whose logarithm has the standard error `relative_error`.
+Interval relative(Real value, Real relative_error);
+
+/// Of independent factors >= 0: half-widths of the logarithms add in quadrature.
+Interval product(const Interval& a, const Interval& b);
+
+/// a / b, b > 0, of independent numbers >= 0.
+Interval quotient(const Interval& a, const Interval& b);
+
+/// Median of values and the pair of order statistics around it that holds the true one with at least 95 % for any distribution
+/// (sign test); the least and the largest where they are too few for that, which five are (94 %).  Nothing for no values.
+std::optional<Interval> median_interval(std::vector<Real> values);
+
+}  // namespace nullmark

@@ -1,0 +1,142 @@
+#pragma once
+
+#include <algorithm>
+#include <memory>
+
+#include "harness/kernel/block_kernel.h"
+#include "media/base/medium.h"
+
+namespace nullmark {
+
+/// A tracker on a ray along x from the origin, its loop run by hand: for tests that look at single walks and their events.
+template <template <class> class Estimator, class Value = Real>
+class HandWalked {
+ public:
+  using E = Estimator<Value>;
+  using Passage = typename detail::RayOf<E, Value>::type;
+
+  struct Outcome {
+    Event<Value> event;
+    Value result;
+    Real lookups = 0;
+  };
+
+  HandWalked(E tracker, std::shared_ptr<const Medium> medium, Real length, Real looseness = 1, int pieces = 1)
+      : estimator(std::move(tracker)), medium_(std::move(medium)) {
+    const Vec3 middle = (medium_->bounds().lo + medium_->bounds().hi) / 2;
+    line_ = {{0, middle.y(), middle.z()}, Vec3::UnitX(), 0, length};
+    ray.begin = 0;
+    ray.end = length;
+    ray.channels = medium_->channels();
+    ray.medium = medium_->extrema(medium_->bounds());
+    for (int i = 0; i < pieces; ++i) {
+      const Real a = length * i / pieces, b = i + 1 == pieces ? length : length * (i + 1) / pieces;
+      const Extrema bounds = medium_->extrema({line_.at(a), line_.at(b)});
+      ray.bounds.segments.push_back({a, b, bounds.maximum.maxCoeff() * looseness, bounds});
+    }
+    ray.majorant.start(0);
+    for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
+    if (const auto depth = medium_->optical_depth(line_)) ray.exact_depth = load<Value>(depth->data(), ray.channels);
+    medium_->knots(line_, ray.knots);
+    ray.knots.insert(ray.knots.end(), {Real{0}, length});
+    std::sort(ray.knots.begin(), ray.knots.end());
+    ray.degree = medium_->polynomial_degree();
+    ray.distance_at_depth = [this](Real depth) { return distance_at_depth(*medium_, line_, depth); };
+    for (const Segment& segment : ray.bounds.segments) {
+      const Spectrum bounds = medium_->component_maxima({line_.at(segment.begin), line_.at(segment.end)});
+      ray.shares.push_back(bounds / bounds.sum());
+    }
+    ray.albedo = ray.value(0);
+    ray.throughput = ray.value(1);
+    prepare();
+  }
+  HandWalked(const HandWalked&) = delete;
+  HandWalked& operator=(const HandWalked&) = delete;
+
+  /// After changes to the ray or the estimator.
+  void prepare() {
+    if constexpr (requires { estimator.prepare(ray); }) estimator.prepare(ray);
+  }
+
+  /// A walk that would take more lookups is given up, as the harness does: its lookups are `most`, and it has no result.
+  Outcome walk(auto& rng, Real most = kInfinity) const {
+    typename E::Walk walk;
+    Flight flight;
+    flight.start(ray.majorant);
+    estimator.init(walk, ray, flight, rng);
+    Outcome outcome;
+    for (; estimator.propose(walk, ray, flight, rng); ++outcome.lookups) {
+      if (outcome.lookups == most) return outcome;
+      estimator.consume(walk, ray, flight, looked_up(walk, flight), rng);
+    }
+    outcome.result = estimator.result(walk, ray);
+    if constexpr (requires { estimator.event(walk, ray, flight); }) outcome.event = estimator.event(walk, ray, flight);
+    return outcome;
+  }
+
+  Outcome walk(std::uint64_t sample) const {
+    Rng rng(SampleAddress{20170701, 0, sample});
+    return walk(rng);
+  }
+
+  Value extinction(Real t) const {
+    const Vec3 p = line_.at(t);
+    std::array<Real, kMaxChannels> out{};
+    medium_->extinction({&p.x(), &p.y(), &p.z(), 1}, out.data());
+    return load<Value>(out.data(), ray.channels);
+  }
+
+  Value transmittance(Real t) const {
+    Ray part = line_;
+    part.end = t;
+    const Spectrum depth = *medium_->optical_depth(part);
+    return exponential(Value(-load<Value>(depth.data(), ray.channels)));
+  }
+
+  RayProfile profile() const {
+    std::vector<Real> ends, rates;
+    for (const Segment& segment : ray.bounds.segments) {
+      ends.push_back(segment.end);
+      rates.push_back(segment.majorant);
+    }
+    return RayProfile(
+        [this](const Real* t, std::size_t count, Real* out) {
+          for (std::size_t i = 0; i < count; ++i) store(extinction(t[i]), out + i * static_cast<std::size_t>(ray.channels));
+        },
+        ray.channels, ray.knots, ends, rates);
+  }
+
+  Theory theory(int channel = 0) const { return estimator.theory(ray, profile(), channel, Quantity::transmittance); }
+
+  E estimator;
+  Passage ray;
+
+ private:
+  Value looked_up(const typename E::Walk& walk, const Flight& at) const {
+    if constexpr (requires { estimator.component(walk); }) {
+      const int i = estimator.component(walk);
+      return medium_->component_extinction(i, line_.at(at.position())) / ray.shares[at.piece()][i];
+    } else {
+      return extinction(at.position());
+    }
+  }
+
+  std::shared_ptr<const Medium> medium_;
+  Ray line_;
+};
+
+/// Mean of samples with its standard error.
+struct Estimate {
+  Real count = 0, sum = 0, squares = 0;
+
+  void add(Real x) {
+    ++count;
+    sum += x;
+    squares += x * x;
+  }
+  Real mean() const { return sum / count; }
+  Real variance() const { return std::max<Real>(0, squares / count - mean() * mean()); }
+  Real error() const { return std::sqrt(variance() / count); }
+};
+
+}  // namespace nullmark

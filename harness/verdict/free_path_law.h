@@ -1,0 +1,26 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "harness/verdict/walk_laws.h"
+
+namespace nullmark {
+
+/// Why the distribution of free paths is not tested, in half a sentence; empty where it is: weights are 1, since the range is
+/// binary and the majorant bounds, or since theory states a weight without variance; and the medium is grey.
+std::string why_no_free_path_laws(const Scene& scene, SampleRange range, const CellTheory& theory);
+
+/// The distribution of free paths against the exact one, of samplers whose weights are 1.  Every ray's axis is cut into
+/// kFreePathCells cells with exact probabilities, and the escape, an atom of probability T.
+///
+///   kolmogorov_smirnov  the largest distance of the two distribution functions at the cells' ends, p <= 2 exp(-2 n D^2)
+///                       [Dvoretzky, Kiefer, Wolfowitz 1956; Massart 1990]
+///   chi_square          cells and escape; cells of fewer than 20 expected collisions are pooled
+///
+/// Nothing where the law does not apply or `stop` answered true.
+std::vector<LawRecord> free_path_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, SampleRange range,
+                                      const CellTheory& theory, const LawBudget& budget, const std::function<bool()>& stop);
+
+}  // namespace nullmark

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "harness/model/record.h"
+#include "harness/sampling/cell_preparation.h"
+#include "harness/sampling/sampling.h"
+
+namespace nullmark {
+
+/// What verdicts and all statistics cost beside the sampling they are of, and the walks that did not end.
+struct Effort {
+  double judging = 0, statistics = 0, working = 0;
+  std::uint64_t overruns = 0;
+  Effort& operator+=(const Sampled& sampled) {
+    overruns += sampled.counters.overruns;
+    judging += sampled.judging_seconds;
+    statistics += sampled.statistics_seconds;
+    working += sampled.working_seconds;
+    return *this;
+  }
+  Effort& operator+=(const Effort& other) {
+    overruns += other.overruns;
+    judging += other.judging;
+    statistics += other.statistics;
+    working += other.working;
+    return *this;
+  }
+};
+
+/// Sizes of the families that a verdict's levels are shared out over.
+struct Families {
+  std::uint64_t means = 1, lookups = 1, laws = 1;
+};
+
+/// Why a cell has no verdict; empty where it has one.
+std::string why_not_judged(const PreparedCell& prepared);
+
+/// Any tracker is right where there is nothing to meet.  Light may still meet surfaces.
+bool tests_nothing(const PreparedCell& prepared);
+
+/// The tests of a cell; nothing for cells that claim nothing that could be tested.  Where theory has no variance a pilot is
+/// drawn, and some of its samples are kept.
+std::optional<CellGate> tests_of(const PreparedCell& prepared, const TestLevels& levels, std::vector<KeptSamples>& kept,
+                                   const std::function<bool()>& stop);
+
+/// Looks at the evidence of the first samples and draws further ones while the verdict is open.  Nothing where interrupted.
+std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
+                                   std::span<const KeptSamples> kept, const GateLevels& levels, const Families& families,
+                                   Effort& effort, const std::function<bool()>& stop,
+                                   const std::function<void(double)>& progress);
+
+}  // namespace nullmark

@@ -1,0 +1,206 @@
+// What verdicts say of trackers that are wrong in ways a mean at epsilon does not show, and of right ones that it would not pass.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "harness/analysis/check.h"
+#include "harness/config/config.h"
+#include "harness/testing/run_untimed.h"
+
+namespace nullmark {
+namespace {
+
+std::vector<CellRecord> run(const std::string& experiment, std::uint64_t seed = 1) {
+  return run_untimed(read_config(
+      fmt::format(
+          R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e","rays":{{"type":"single",
+              "from":[0,0.5,0.5],"to":[1,0.5,0.5]}},{}}}]}})",
+          experiment),
+      "judging.json", seed));
+}
+
+const VerdictRecord& verdict_of(const std::vector<CellRecord>& records) { return records.at(0).verdict.value(); }
+
+/// A bias of 0, .3, .9 and 1.1 epsilon where epsilon is tolerated: never a FAIL below it, never a PASS above.
+TEST(Judging, ToleratingEpsilonIsNeverWrong) {
+  struct Case {
+    Real part;
+    const char* tracker;
+    Real epsilon;
+    int passes = 0, fails = 0;
+  };
+  for (Case one : {Case{0, "ratio", 0.01}, Case{0.3, "planted_slight", 0.01}, Case{0.9, "planted_slight", 0.003 / 0.9},
+                   Case{1.1, "planted_slight", 0.003 / 1.1}}) {
+    for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+      const auto records = run(
+          fmt::format(
+              R"("samples_per_ray":4096,"gate":{{"epsilon":{},"tolerate":"epsilon","max_samples_per_ray":400000,"laws":"never"}},
+                  "matrix":{{"estimator":"{}","medium":{{"type":"homogeneous","extinction":1}},
+                             "majorant":{{"type":"global","looseness":50}}}})",
+              one.epsilon, one.tracker),
+          seed);
+      one.passes += verdict_of(records).unbiased == Outcome::pass;
+      one.fails += verdict_of(records).unbiased == Outcome::fail;
+    }
+    std::printf("bias %.1f epsilon: %d PASS, %d FAIL, %d open of 100\n", one.part, one.passes, one.fails,
+                100 - one.passes - one.fails);
+    if (one.part < 1) {
+      EXPECT_EQ(one.fails, 0);
+    } else {
+      EXPECT_EQ(one.passes, 0);
+    }
+    if (one.part < 0.5) {
+      EXPECT_EQ(one.passes, 100);
+    }
+  }
+}
+
+/// The same bias where none is tolerated: a FAIL once the samples are enough for it, and its size is told.
+TEST(Judging, ToleratingNothingFindsWhatIsBelowEpsilon) {
+  const auto records = run(
+      R"("samples_per_ray":1000000,"gate":{"epsilon":0.01},"matrix":{"estimator":"planted_slight",
+         "medium":{"type":"homogeneous","extinction":1},"majorant":{"type":"global","looseness":50}})");
+  EXPECT_EQ(verdict_of(records).unbiased, Outcome::fail);
+  EXPECT_TRUE(verdict_of(records).biased);
+  EXPECT_FALSE(verdict_of(records).beyond);
+  EXPECT_NE(verdict_of(records).reason.find("+0.3 %"), std::string::npos) << verdict_of(records).reason;
+}
+
+/// PASS takes the planned samples, also where the margin is proven sooner.
+TEST(Judging, APassTakesThePlannedSamples) {
+  const auto records = run(
+      R"("samples_per_ray":1024,"gate":{"max_samples_per_ray":4000000},"matrix":{"estimator":["delta","ratio"],
+         "medium":{"type":"linear","optical_depth":[0.1,1]}})");
+  for (const CellRecord& record : records) {
+    EXPECT_EQ(record.verdict->unbiased, Outcome::pass) << record.cell.name;
+    EXPECT_GE(record.verdict->samples_per_ray, record.verdict->planned);
+    std::uint64_t planned = 1024;
+    for (const TestRecord& test : record.verdict->tests)
+      if (test.basis != "counted") planned = std::max(planned, test.planned);
+    EXPECT_LE(record.verdict->samples_per_ray, 3 * planned);
+    EXPECT_EQ(record.verdict->proves.rfind("|bias| < ", 0), 0u) << record.verdict->proves;
+  }
+}
+
+/// A plan that is affordable is drawn, though not four times over.
+TEST(Judging, WhatIsAffordableIsDrawn) {
+  const std::string cell = R"("samples_per_ray":1024,"gate":{{"max_samples_per_ray":{}}},"matrix":{{"estimator":"delta",
+      "medium":{{"type":"homogeneous","extinction":1}},"majorant":{{"type":"global","looseness":2}}}})";
+  const std::uint64_t planned = verdict_of(run(fmt::format(fmt::runtime(cell), 100'000'000))).planned;
+  const auto records = run(fmt::format(fmt::runtime(cell), planned + planned / 4));
+  EXPECT_GT(verdict_of(records).samples_per_ray, planned);
+  EXPECT_TRUE(verdict_of(records).planned_undecidable);  // a right tracker may stay open there
+  const auto beyond = run(fmt::format(fmt::runtime(cell), planned / 2));
+  EXPECT_EQ(verdict_of(beyond).samples_per_ray, 1024u);
+}
+
+/// The allowance is drawn on where half of what proves a bias is there, and where the configuration says so.
+TEST(Judging, AnAllowanceTooSmallIsDrawnForAPromiseOrOnRequest) {
+  const std::string cell = R"("samples_per_ray":2048,"gate":{{"epsilon":1e-4,"max_samples_per_ray":20000{}}},
+      "matrix":{{"estimator":"{}","medium":{{"type":"homogeneous","extinction":1}},"majorant":{{"type":"global","looseness":2}}}})";
+  EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), "", "delta"))).samples_per_ray, 2048u);
+  EXPECT_GE(verdict_of(run(fmt::format(fmt::runtime(cell), R"(,"samples":"all")", "delta"))).samples_per_ray, 20000u);
+  // A bias of -40 % shows in the first 2048 samples.
+  EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), "", "planted_whole_depth"))).unbiased, Outcome::fail);
+}
+
+/// No lookup is met by a bound of 1e-30, so none is counted above it; the medium's own points tell.
+TEST(Judging, AViolationNeedsNoLookup) {
+  const auto records = run(
+      R"("samples_per_ray":4096,"matrix":{"estimator":"delta","medium":{"type":"homogeneous","extinction":1},
+         "majorant":{"type":"prescribed","value":[1e-30,1e-5]}})");
+  for (const CellRecord& record : records) EXPECT_EQ(record.verdict->unbiased, Outcome::violated) << record.cell.name;
+  // Only the box's bound is above the rate here: the cell is judged, and what is not proven is said.
+  const auto noise = run(
+      R"("samples_per_ray":1048576,"matrix":{"estimator":"delta","medium":{"type":"fractal_noise","peak":3},
+         "majorant":{"type":"prescribed","value":2.5}})");
+  EXPECT_EQ(verdict_of(noise).unbiased, Outcome::pass);
+  EXPECT_TRUE(verdict_of(noise).bound_unproven);
+}
+
+/// A given reference with an error does not take the place of a closed form, nor break the law of the variance.
+TEST(Judging, AGivenReferenceKeepsATighterOne) {
+  const auto records = run(
+      R"("samples_per_ray":20000,"reference":{"value":0.5,"error":0.6,"source":"a guess"},"gate":{"laws":"always"},
+         "matrix":{"estimator":"ratio","medium":{"type":"homogeneous","extinction":1.01}})");
+  EXPECT_EQ(records.at(0).reference_method, "closed_form");
+  EXPECT_NE(verdict_of(records).lawful, Outcome::fail);
+}
+
+/// Coordinates that double tells to fewer digits than epsilon: no verdict, rather than a false one; nearer ones are judged.
+TEST(Judging, FarCoordinatesAreNoBias) {
+  for (const auto& [from, to] : {std::pair{"1e15", "1000000000000001"}, {"1e11", "100000000001"}, {"1e7", "10000001"}}) {
+    const auto records = run_untimed(
+        read_config(fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e",
+            "rays":{{"type":"orthographic","axis":"x","width":1,"height":1}},"samples_per_ray":65536,
+            "matrix":{{"estimator":["closed_form","regular","delta","ratio","residual_ratio","next_flight_ratio",
+                                    "unbiased_ray_marching","p_series_cmf"],
+                       "medium":{{"type":"linear","lo":[{},0,0],"hi":[{},1,1],"optical_depth":1}}}}}}]}})",
+                                from, to),
+                    "far.json"));
+    for (const CellRecord& record : records) {
+      const bool farthest = std::string(from) == "1e15";
+      EXPECT_EQ(record.status, farthest ? Status::skipped : Status::ok) << record.cell.name << record.reason;
+      if (record.verdict) {
+        EXPECT_NE(record.verdict->unbiased, Outcome::fail) << record.cell.name << ": " << record.verdict->reason;
+      }
+    }
+  }
+}
+
+/// The extinction is unbounded at y = 0, which the ray does not touch.
+TEST(Judging, APoleElsewhereIsNoBias) {
+  const auto records = run(
+      R"("samples_per_ray":200000,"gate":{"epsilon":0.02,"laws":"always"},
+         "matrix":{"estimator":["ratio","next_flight_ratio"],"medium":{"type":"exponential_cube","axis":"y"},
+                   "majorant":{"type":"prescribed","value":2}})");
+  for (const CellRecord& record : records) {
+    EXPECT_LT(record.channel.at(0).reference_error.value_or(kInfinity), 1e-12);
+    EXPECT_EQ(record.verdict.value().unbiased, Outcome::pass) << record.verdict->reason;
+    EXPECT_NE(record.verdict->lawful, Outcome::fail);
+  }
+}
+
+/// A stated variance that is too small, or of samples with a range too large, is no variance to rest a proof on.
+TEST(Judging, StatedVariancesAreTested) {
+  const std::string cell =
+      R"("samples_per_ray":65536,"gate":{{"epsilon":0.05}},"matrix":{{"estimator":{{"type":"planted_variance",
+      "factor":{}}},"medium":{{"type":"homogeneous","extinction":1}},"majorant":{{"type":"global","looseness":2}}}})";
+  for (const Real factor : {0.23, 4.}) EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), factor))).lawful, Outcome::fail);
+  EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), 1.))).lawful, Outcome::pass);
+}
+
+/// No lookup at all, as stated: right, and nothing is divided by 0.
+TEST(Judging, NoLookupIsACountToo) {
+  const auto records = run(
+      R"("samples_per_ray":4096,"matrix":{"estimator":{"type":"planted_exact","error":0},
+         "medium":{"type":"homogeneous","extinction":1}})");
+  EXPECT_EQ(verdict_of(records).lookups, Outcome::pass);
+}
+
+/// The guarantee "exact" is one on every sample.
+TEST(Judging, ExactMeansEverySample) {
+  const auto records = run(
+      R"("samples_per_ray":64,"matrix":{"estimator":[{"type":"planted_exact","error":0},{"type":"planted_exact","error":1e-9}],
+         "medium":{"type":"homogeneous","extinction":1}})");
+  EXPECT_EQ(records.at(0).verdict->unbiased, Outcome::pass);
+  EXPECT_EQ(records.at(1).verdict->unbiased, Outcome::fail);
+}
+
+/// Lookups of flights that the harness draws are counted walk by walk; a tracker that looks up twice has none that count.
+TEST(Judging, LookupsAreCountedWhereTheFlightIsTheHarnesss) {
+  const auto verdict = [](const std::string& tracker) {
+    return verdict_of(run(fmt::format(
+        R"("samples_per_ray":4096,"gate":{{"max_samples_per_ray":4000000}},"matrix":{{"estimator":"{}",
+           "medium":{{"type":"homogeneous","extinction":0.1}},"majorant":{{"type":"global","looseness":2}}}})",
+        tracker)));
+  };
+  EXPECT_GE(verdict("ratio").counted_walks, 688u);
+  EXPECT_EQ(verdict("ratio").lookups, Outcome::pass);
+  EXPECT_EQ(verdict("delta").counted_walks, 0u);
+  EXPECT_EQ(verdict("planted_second_lookup").counted_walks, 0u);
+  EXPECT_EQ(verdict("planted_second_lookup").lookups, Outcome::fail);
+}
+
+}  // namespace
+}  // namespace nullmark

@@ -1,0 +1,155 @@
+#include "harness/verdict/verdict.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace nullmark {
+namespace {
+
+/// The reference's own error may take so much of epsilon where a PASS is to be had.
+constexpr Real kReferenceShare = 0.25;
+
+std::string place_of(const TestRecord& test, const std::vector<std::string>& outputs, std::size_t tests) {
+  if (test.channel < 0) return "lookups: ";
+  if (tests == 1 && test.group < 0) return "";
+  const auto output = static_cast<std::size_t>(test.channel);
+  const std::string text = output < outputs.size() ? outputs[output] : fmt::format("channel {}", test.channel);
+  return test.group < 0 ? text + ": " : fmt::format("{}, ray group {}: ", text, test.group);
+}
+
+/// A mean error as a share of the reference, or itself where there is nothing to share.
+std::string as_share(Real error, Real reference) {
+  return reference != 0 && std::isfinite(error / reference) ? fmt::format("{:+.2g} %", 100 * error / reference)
+                                                            : fmt::format("{:+.3g}", error);
+}
+
+/// "mean .3582, reference .3607: -.69 %", with as many digits as tell the two apart.
+std::string measured_bias(const TestRecord& test) {
+  const Real mean = test.reference + test.mean_error;
+  const Real apart = test.mean_error != 0 ? std::abs(test.reference / test.mean_error) : 1;
+  const int digits = std::clamp(static_cast<int>(std::ceil(std::log10(std::max<Real>(1, apart)))) + 2, 4, 15);
+  return fmt::format("mean {:.{}g}, expected {:.{}g}: {}", mean, digits, test.reference, digits,
+                     as_share(test.mean_error, test.reference));
+}
+
+std::string failure(const TestRecord& test, const Proof& proof, Real alpha) {
+  if (test.deterministic())
+    return fmt::format("a sample is off by {:.3g}, rounding allows {:.3g}; {}", test.largest_error,
+                       test.rounding + test.reference_error, measured_bias(test));
+  const Real needed = -std::log(alpha);
+  if (proof.beyond && !proof.biased)
+    return fmt::format("{}; a bias beyond epsilon is proven (log E {:.1f} > {:.1f})", measured_bias(test), test.log_e_beyond,
+                       needed);
+  return fmt::format("{}; biased{}, proven (log E {:.1f} > {:.1f})", measured_bias(test), proof.beyond ? " beyond epsilon" : "",
+                     test.log_e_fail, needed);
+}
+
+/// The test that PASS says least of, relative to its reference; `error` is what is small.
+std::string within_text(const std::vector<const TestRecord*>& tests, const char* error) {
+  const TestRecord* widest = nullptr;
+  const auto relative = [](const TestRecord& test) {
+    return test.reference != 0 ? test.epsilon / std::abs(test.reference) : kInfinity;
+  };
+  for (const TestRecord* test : tests)
+    if (test->group < 0 && (!widest || relative(*test) > relative(*widest))) widest = test;
+  if (!widest) return "";
+  const Real of = widest->deterministic() ? widest->rounding + widest->reference_error : widest->epsilon;
+  if (widest->reference == 0) return fmt::format("{} < {:.2g}", error, of);
+  return fmt::format("{} < {:.2g} % of the mean", error, 100 * of / std::abs(widest->reference));
+}
+
+}  // namespace
+
+Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
+  if (test.deterministic()) {
+    const bool right = test.largest_error <= test.rounding + test.reference_error;
+    const bool far = !right && std::abs(test.mean_error) > test.epsilon + test.rounding + test.reference_error;
+    return {.biased = !right, .beyond = far, .within = right && test.reference_error <= kReferenceShare * test.epsilon};
+  }
+  const Real to_fail = -std::log(alpha_fail), to_pass = -std::log(alpha_pass);
+  const bool precise = test.reference_error <= kReferenceShare * test.epsilon;
+  return {.biased = test.log_e_fail >= to_fail,
+          .beyond = test.log_e_beyond >= to_fail,
+          .within = precise && (test.basis == "counted" || (test.log_e_low >= to_pass && test.log_e_high >= to_pass))};
+}
+
+void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
+  const bool lenient = verdict.tolerate == Tolerate::epsilon;
+  const auto outcome_of = [&](const Proof& proof) {
+    if (proof.beyond || (proof.biased && !lenient)) return Outcome::fail;
+    return proof.within ? Outcome::pass : Outcome::inconclusive;
+  };
+  verdict.unbiased = verdict.own_mean = verdict.lookups = Outcome::none;
+  verdict.biased = verdict.beyond = false;
+  verdict.proves.clear();
+  Outcome& outcome = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
+  const Real alpha = verdict.alpha / static_cast<Real>(verdict.family);
+  const Real alpha_lookups = verdict.alpha / static_cast<Real>(verdict.lookups_family);
+  const auto means = static_cast<std::size_t>(
+      std::count_if(verdict.tests.begin(), verdict.tests.end(), [](const TestRecord& test) { return test.channel >= 0; }));
+  const TestRecord *failed = nullptr, *open = nullptr, *slightly = nullptr;
+  std::vector<const TestRecord*> within;
+  for (TestRecord& test : verdict.tests) {
+    if (test.channel < 0) {
+      test.outcome = verdict.lookups = outcome_of(proven(test, alpha_lookups, verdict.alpha_pass));
+      continue;
+    }
+    const Proof proof = proven(test, alpha, verdict.alpha_pass);
+    verdict.biased |= proof.biased;
+    verdict.beyond |= proof.beyond;
+    test.outcome = outcome_of(proof);
+    if (test.outcome == Outcome::fail && (!failed || test.log_e_fail > failed->log_e_fail)) failed = &test;
+    if (test.outcome == Outcome::inconclusive && !open) open = &test;
+    if (test.outcome == Outcome::pass) within.push_back(&test);
+    if (test.outcome == Outcome::pass && proof.biased) slightly = &test;
+  }
+  verdict.within = means > 0 && within.size() == means;
+  verdict.lawful = verdict.laws.empty() ? Outcome::none : Outcome::pass;
+  const Real broken = std::log(static_cast<Real>(verdict.laws_family) / verdict.alpha);
+  for (LawRecord& law : verdict.laws) {
+    law.outcome = law.log_e >= broken ? Outcome::fail : Outcome::pass;
+    if (law.outcome == Outcome::fail) verdict.lawful = Outcome::fail;
+  }
+  const bool drawn_as_planned = lenient || verdict.samples_per_ray >= verdict.planned;
+  const auto reason = [&](const TestRecord& test, const std::string& text) {
+    verdict.reason = place_of(test, outputs, means) + text;
+  };
+  if (means == 0) {
+    outcome = Outcome::none;
+  } else if (verdict.violated) {
+    outcome = Outcome::violated;
+    verdict.reason = "needs a majorant that bounds the extinction, and the extinction exceeds it";
+  } else if (verdict.nonfinite > 0) {
+    outcome = Outcome::fail;
+    verdict.reason = fmt::format("{} samples are not finite", verdict.nonfinite);
+  } else if (verdict.out_of_range > 0) {
+    outcome = Outcome::fail;
+    verdict.reason = fmt::format("{} samples lie outside the declared range", verdict.out_of_range);
+  } else if (failed) {
+    outcome = Outcome::fail;
+    reason(*failed, failure(*failed, proven(*failed, alpha, verdict.alpha_pass), alpha));
+  } else if (open || !drawn_as_planned) {
+    outcome = Outcome::inconclusive;
+    // What the plan knew beforehand says more.
+    if (verdict.reason.empty() && open)
+      reason(*open, fmt::format("undecided after {} samples a ray; {} were planned", verdict.samples_per_ray, verdict.planned));
+    else if (verdict.reason.empty())
+      verdict.reason = fmt::format("within epsilon after {} samples a ray, but {} were planned to look for a smaller bias",
+                                   verdict.samples_per_ray, verdict.planned);
+  } else {
+    outcome = Outcome::pass;
+    verdict.reason.clear();
+    // A mean that the tracker predicts of itself may be biased as it says.
+    verdict.proves = within_text(within, verdict.against == "own mean" ? "|mean - own mean|" : "|bias|");
+    if (slightly) verdict.proves += fmt::format("; biased by less: {}", measured_bias(*slightly));
+  }
+}
+
+bool tests_walks(const VerdictRecord& verdict) {
+  return std::any_of(verdict.laws.begin(), verdict.laws.end(),
+                     [](const LawRecord& law) { return law.name != "replay" && !law.name.starts_with("variance"); });
+}
+
+}  // namespace nullmark

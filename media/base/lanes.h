@@ -1,0 +1,265 @@
+#pragma once
+
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "media/base/value.h"
+
+namespace nullmark {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Lanes of one register of this build's instruction set.
+template <class T>
+inline constexpr std::size_t kNativeLanes = HWY_MAX_BYTES / sizeof(T);
+
+template <class T, std::size_t N>
+class LaneMask;
+
+/// N numbers, T float or double, that every operation treats alike: N samples of one ray side by side.  A lane's result depends
+/// on that lane alone and not on N, so Lanes<T, 1> is the scalar form of the same source.  Constants are rounded to T first.
+template <class T, std::size_t N>
+class Lanes {
+ public:
+  using Tag = hn::FixedTag<T, N>;
+  using Vector = hn::Vec<Tag>;
+
+  Lanes() = default;
+  Lanes(Vector vector) : vector_(vector) {}
+  template <class Number>
+  requires std::is_arithmetic_v<Number> Lanes(Number x) : vector_(hn::Set(Tag(), static_cast<T>(x))) {}
+
+  static Lanes load(const T* from) { return hn::LoadU(Tag(), from); }
+  void store(T* to) const { hn::StoreU(vector_, Tag(), to); }
+  void store(T* to, LaneMask<T, N> lanes) const { hn::BlendedStore(vector_, lanes.mask(), Tag(), to); }
+  Vector vector() const { return vector_; }
+
+  friend Lanes operator+(Lanes a, Lanes b) { return hn::Add(a.vector_, b.vector_); }
+  friend Lanes operator-(Lanes a, Lanes b) { return hn::Sub(a.vector_, b.vector_); }
+  friend Lanes operator*(Lanes a, Lanes b) { return hn::Mul(a.vector_, b.vector_); }
+  friend Lanes operator/(Lanes a, Lanes b) { return hn::Div(a.vector_, b.vector_); }
+  friend Lanes operator-(Lanes a) { return hn::Neg(a.vector_); }
+  Lanes& operator+=(Lanes b) { return *this = *this + b; }
+  Lanes& operator*=(Lanes b) { return *this = *this * b; }
+
+  friend LaneMask<T, N> operator<(Lanes a, Lanes b) { return hn::Lt(a.vector_, b.vector_); }
+  friend LaneMask<T, N> operator>(Lanes a, Lanes b) { return b < a; }
+  friend LaneMask<T, N> operator==(Lanes a, Lanes b) { return hn::Eq(a.vector_, b.vector_); }
+
+  friend Lanes smaller(Lanes a, Lanes b) { return hn::Min(a.vector_, b.vector_); }
+  friend Lanes larger(Lanes a, Lanes b) { return hn::Max(a.vector_, b.vector_); }
+  friend Lanes smallest(Lanes a) { return a; }
+  friend Lanes magnitude(Lanes a) { return hn::Abs(a.vector_); }
+  friend Lanes signed_root(Lanes a) { return hn::CopySign(hn::Sqrt(hn::Abs(a.vector_)), a.vector_); }
+  friend Lanes rounded_down(Lanes a) { return hn::Floor(a.vector_); }
+  /// At most 1 ulp off.  In float what is below the least normal number is 0: steps with denormal numbers take a CPU hundreds of
+  /// cycles, and the tail of a Gaussian layer would have one in most registers.
+  friend Lanes exponential(Lanes a) {
+    if constexpr (std::is_same_v<T, float>) {
+      const Vector least = hn::Set(Tag(), -87.33654f);  // log of the least normal number
+      return hn::IfThenElseZero(hn::Ge(a.vector_, least), hn::Exp(Tag(), hn::Max(a.vector_, least)));
+    } else {
+      return hn::Exp(Tag(), a.vector_);
+    }
+  }
+  /// At most 4 ulp off; 0 at 1.
+  friend Lanes logarithm(Lanes a) { return hn::Log(Tag(), a.vector_); }
+  friend Lanes negative_logarithm(Lanes a) { return -logarithm(a); }
+  /// 1 - e^a, at most 4 ulp off.
+  friend Lanes one_minus_exponential(Lanes a) { return -Lanes(hn::Expm1(Tag(), a.vector_)); }
+  /// At most 3 ulp off, for magnitudes below 39000.
+  friend Lanes cosine(Lanes a) { return hn::Cos(Tag(), a.vector_); }
+  friend T least_normal(Lanes) { return std::numeric_limits<T>::min(); }
+  friend LaneMask<T, N> vanished(Lanes a) { return a == Lanes(0); }
+
+ private:
+  Vector vector_;
+};
+
+/// One truth per lane, in a mask register.
+template <class T, std::size_t N>
+class LaneMask {
+ public:
+  using Tag = hn::FixedTag<T, N>;
+  using Mask = hn::Mask<Tag>;
+
+  LaneMask() = default;
+  LaneMask(Mask mask) : mask_(mask) {}
+  LaneMask(bool all) : LaneMask(first(all ? N : 0)) {}
+  static LaneMask first(std::size_t n) { return hn::FirstN(Tag(), n); }
+  /// From and to 8 bytes.
+  static LaneMask load(const std::uint8_t* from) { return hn::LoadMaskBits(Tag(), from); }
+  void store(std::uint8_t* to) const { hn::StoreMaskBits(Tag(), mask_, to); }
+  Mask mask() const { return mask_; }
+
+  friend LaneMask operator&(LaneMask a, LaneMask b) { return hn::And(a.mask_, b.mask_); }
+  friend LaneMask operator|(LaneMask a, LaneMask b) { return hn::Or(a.mask_, b.mask_); }
+  friend LaneMask operator!(LaneMask a) { return hn::Not(a.mask_); }
+  friend std::size_t count(LaneMask a) { return hn::CountTrue(Tag(), a.mask_); }
+  friend bool none(LaneMask a) { return hn::AllFalse(Tag(), a.mask_); }
+  friend Lanes<T, N> select(LaneMask yes, Lanes<T, N> a, Lanes<T, N> b) {
+    return hn::IfThenElse(yes.mask_, a.vector(), b.vector());
+  }
+
+ private:
+  Mask mask_;
+};
+
+/// A LaneMask as it is kept among a walk's numbers, in a register of the same layout.
+template <class T, std::size_t N>
+class LaneTruth {
+ public:
+  LaneTruth() = default;
+  LaneTruth(LaneMask<T, N> mask) : bits_(hn::VecFromMask(Tag(), mask.mask())) {}
+  LaneTruth(bool all) : LaneTruth(LaneMask<T, N>(all)) {}
+  explicit LaneTruth(hn::Vec<hn::FixedTag<T, N>> bits) : bits_(bits) {}
+  hn::Vec<hn::FixedTag<T, N>> vector() const { return bits_; }
+  operator LaneMask<T, N>() const { return hn::MaskFromVec(bits_); }
+  friend LaneMask<T, N> operator!(LaneTruth a) { return !LaneMask<T, N>(a); }
+  friend Lanes<T, N> select(LaneTruth yes, Lanes<T, N> a, Lanes<T, N> b) { return select(LaneMask<T, N>(yes), a, b); }
+
+ private:
+  using Tag = hn::FixedTag<T, N>;
+  hn::Vec<Tag> bits_;
+};
+
+template <std::size_t N>
+inline constexpr bool kInFloat<Lanes<float, N>> = true;
+
+template <class T, std::size_t N>
+struct Walking<Lanes<T, N>> {
+  using Distance = Lanes<T, N>;
+  using Truth = LaneTruth<T, N>;
+};
+
+/// N indices, signed and as wide as T, for tables of T.
+template <class T, std::size_t N>
+class LaneIndex {
+ public:
+  using Tag = hn::RebindToSigned<hn::FixedTag<T, N>>;
+  using Vector = hn::Vec<Tag>;
+  using Number = hn::TFromD<Tag>;
+
+  LaneIndex() = default;
+  LaneIndex(Vector vector) : vector_(vector) {}
+  explicit LaneIndex(Number x) : vector_(hn::Set(Tag(), x)) {}
+  static LaneIndex counting_from(Number first) { return hn::Iota(Tag(), first); }
+  static LaneIndex load(const Number* from) { return hn::LoadU(Tag(), from); }
+  void store(Number* to) const { hn::StoreU(vector_, Tag(), to); }
+  void store(Number* to, LaneMask<T, N> lanes) const {
+    hn::BlendedStore(vector_, hn::RebindMask(Tag(), lanes.mask()), Tag(), to);
+  }
+  Vector vector() const { return vector_; }
+
+  friend LaneIndex operator+(LaneIndex a, LaneIndex b) { return hn::Add(a.vector_, b.vector_); }
+  friend LaneMask<T, N> operator<(LaneIndex a, LaneIndex b) {
+    return hn::RebindMask(hn::FixedTag<T, N>(), hn::Lt(a.vector_, b.vector_));
+  }
+  friend LaneIndex select(LaneMask<T, N> yes, LaneIndex a, LaneIndex b) {
+    return hn::IfThenElse(hn::RebindMask(Tag(), yes.mask()), a.vector_, b.vector_);
+  }
+
+  /// from[stride * index] per lane.
+  template <int stride>
+  Lanes<T, N> gathered(const T* from) const {
+    const Vector at = hn::Mul(vector_, hn::Set(Tag(), stride));
+    return hn::GatherIndex(hn::FixedTag<T, N>(), from, at);
+  }
+
+  friend Lanes<T, N> entry(const std::vector<Real>& table, LaneIndex at) {
+    Number index[N];
+    T x[N];
+    at.store(index);
+    for (std::size_t k = 0; k < N; ++k) x[k] = static_cast<T>(table[static_cast<std::size_t>(index[k])]);
+    return Lanes<T, N>::load(x);
+  }
+
+ private:
+  Vector vector_;
+};
+
+/// Closes ranks: the lanes of a mask move side by side to the front, in their order.
+template <class T, std::size_t N>
+class ClosedRanks {
+ public:
+  explicit ClosedRanks(LaneMask<T, N> kept) {
+    const typename LaneIndex<T, N>::Tag integers;
+    if constexpr (N == 8 && sizeof(T) == 8) {
+      // Highway 1.0.3 copies its table of orders to the stack at every call.
+      std::uint8_t bits[8];
+      hn::StoreMaskBits(hn::FixedTag<T, N>(), kept.mask(), bits);
+      const std::uint64_t packed = kOrders[bits[0]];
+      order_ = hn::IndicesFromVec(
+          hn::FixedTag<T, N>(),
+          hn::And(hn::Shr(hn::Set(integers, static_cast<std::int64_t>(packed)), shifts(integers)), hn::Set(integers, 7)));
+    } else if constexpr (N > 1) {
+      const auto mask = hn::RebindMask(integers, kept.mask());
+      order_ = hn::IndicesFromVec(hn::FixedTag<T, N>(), hn::Compress(hn::Iota(integers, 0), mask));
+    }
+  }
+
+  /// Of any register with N lanes as wide as T.
+  template <class Vector>
+  Vector operator()(Vector lanes) const {
+    if constexpr (N == 1)
+      return lanes;
+    else {
+      const hn::FixedTag<T, N> numbers;
+      return hn::BitCast(hn::DFromV<Vector>(), hn::TableLookupLanes(hn::BitCast(numbers, lanes), order_));
+    }
+  }
+
+ private:
+  /// Per mask of 8 lanes the lanes kept, a byte each.
+  static constexpr auto kOrders = [] {
+    std::array<std::uint64_t, 256> orders{};
+    for (unsigned mask = 0; mask < 256; ++mask)
+      for (unsigned lane = 0, at = 0; lane < 8; ++lane)
+        if (mask >> lane & 1) orders[mask] |= std::uint64_t{lane} << (8 * at++);
+    return orders;
+  }();
+
+  static auto shifts(typename LaneIndex<T, N>::Tag integers) { return hn::ShiftLeft<3>(hn::Iota(integers, 0)); }
+
+  struct Nothing {};
+  template <std::size_t n>
+  static auto indices() {
+    if constexpr (n == 1)
+      return Nothing();
+    else
+      return hn::IndicesFromVec(hn::FixedTag<T, n>(), hn::Iota(typename LaneIndex<T, n>::Tag(), 0));
+  }
+  decltype(indices<N>()) order_;
+};
+
+/// out[i] = f(x[i]), f taking Lanes and giving Lanes; x and out may be the same.
+template <class T, class Function>
+void map_lanes(const T* x, std::size_t n, T* out, const Function& f) {
+  constexpr std::size_t kWidth = kNativeLanes<T>, kMost = 16 * kWidth;
+  using Pack = Lanes<T, kWidth>;
+  // What f refers to could change as results are written, so they go to memory of this call first: the compiler then keeps it in
+  // registers.
+  constexpr bool kDirect = std::is_empty_v<Function>;
+  alignas(HWY_MAX_BYTES) T results[kMost];
+  for (std::size_t done = 0; done < n; done += kMost) {
+    const std::size_t left = std::min(kMost, n - done), whole = left / kWidth * kWidth;
+    T* const to = kDirect ? out + done : results;
+    for (std::size_t i = 0; i < whole; i += kWidth) f(Pack::load(x + done + i)).store(to + i);
+    if (whole < left) {
+      // The rest, filled up with its first number, which f takes as well.
+      T rest[kWidth];
+      for (std::size_t k = 0; k < kWidth; ++k) rest[k] = x[done + whole + (whole + k < left ? k : 0)];
+      f(Pack::load(rest)).store(results + whole);
+    }
+    for (std::size_t i = 0; i < whole && !kDirect; i += kWidth) Pack::load(results + i).store(out + done + i);
+    for (std::size_t i = whole; i < left; ++i) out[done + i] = results[i];
+  }
+}
+
+}  // namespace nullmark

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <initializer_list>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "media/base/types.h"
+
+namespace nullmark {
+
+/// Closed or half-open range of a numeric parameter; `exclusive` leaves out the lower end.
+struct Range {
+  Real low = -kInfinity;
+  Real high = kInfinity;
+  bool exclusive = false;
+
+  static constexpr Range any() { return {}; }
+  static constexpr Range positive() { return {0, kInfinity, true}; }
+  static constexpr Range non_negative() { return {0, kInfinity, false}; }
+  static constexpr Range between(Real low, Real high) { return {low, high, false}; }
+  bool contains(Real x) const { return (exclusive ? x > low : x >= low) && x <= high; }
+};
+
+/// What estimators, media, majorants and ray sets tell about their fields: name, default (the field's value), range, unit ("" for
+/// none, "1/length", "length") and one line of text.  The configuration reader, the schema writer and `nullmark list` are
+/// visitors; what they visit knows nothing of JSON.
+class ParameterVisitor {
+ public:
+  virtual ~ParameterVisitor() = default;
+  virtual void number(const char* name, Real& value, Range range, const char* unit, const char* text) = 0;
+  virtual void integer(const char* name, int& value, int low, int high, const char* text) = 0;
+  virtual void flag(const char* name, bool& value, const char* text) = 0;
+  virtual void choice(const char* name, std::string& value, std::initializer_list<const char*> allowed, const char* text) = 0;
+  virtual void text(const char* name, std::string& value, const char* text) = 0;
+  virtual void numbers(const char* name, std::vector<Real>& value, int least, int most, Range range, const char* unit,
+                       const char* text) = 0;
+  virtual void point(const char* name, Vec3& value, const char* unit, const char* text) = 0;
+};
+
+/// Thrown by a constructor or a preparation step whose parameters fit the schema but not each other; becomes exit code 2.
+/// `where` names the parameter (may be empty), the message says what was found, what was expected and the remedy.
+struct ParameterError : std::runtime_error {
+  ParameterError(std::string where, const std::string& message) : std::runtime_error(message), parameter(std::move(where)) {}
+  std::string parameter;
+};
+
+}  // namespace nullmark

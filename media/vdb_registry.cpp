@@ -1,7 +1,0 @@
-#include "media/volume.h"
-
-namespace nullmark {
-
-NULLMARK_REGISTER_MEDIUM(VdbSource);
-
-}  // namespace nullmark

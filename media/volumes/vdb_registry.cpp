@@ -1,0 +1,7 @@
+#include "media/volumes/volume.h"
+
+namespace nullmark {
+
+NULLMARK_REGISTER_MEDIUM(VdbSource);
+
+}  // namespace nullmark
