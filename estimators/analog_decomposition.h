@@ -38,13 +38,13 @@ struct AnalogDecompositionTracking {
                                         " needs mu_c <= mu; \"weighted_decomposition\" takes any control");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Rates control, residual;
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.control.start(ray.begin, ray.bounds.crossing);
     ray.residual.start(ray.begin, ray.bounds.crossing);
     for (const Segment& segment : ray.bounds.segments) {
@@ -59,13 +59,13 @@ struct AnalogDecompositionTracking {
     bool done = false, looked_up = false;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     flight.start(ray.control);
     walk = {flight.next(rng) ? flight.position() : kInfinity, false, false};
     flight.start(ray.residual);
   }
 
-  bool propose(Walk& walk, const Ray&, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData&, Flight& flight, auto& rng) const {
     if (walk.done) return false;
     const bool inside = flight.next(rng);
     if (flight.position() <= walk.control_path) return inside;
@@ -73,22 +73,22 @@ struct AnalogDecompositionTracking {
     return false;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     walk.done = walk.looked_up = rng.uniform() * at.rate() < channel(extinction, 0) - ray.control.rate(at.piece());
   }
 
-  Value result(const Walk& walk, const Ray& ray) const { return ray.value(walk.done ? 0 : 1); }
+  Value result(const Walk& walk, const RayData& ray) const { return ray.value(walk.done ? 0 : 1); }
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray, const Flight& at) const {
+  Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
     return {walk.done ? EventKind::collision : EventKind::escape, std::min(walk.control_path, at.position()), ray.value(1)};
   }
 
-  int real_collisions(const Walk& walk, const Ray&) const { return walk.looked_up; }
+  int real_collisions(const Walk& walk, const RayData&) const { return walk.looked_up; }
 
   /// Where the rate is violated every residual collision is accepted: the walk sees mu_c + min(mu - mu_c, mubr).
-  Theory theory(const Ray& ray, const RayProfile& smooth, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
     std::vector<Real> rate, through, alive;
     for (const RayProfile::Node& at : profile.nodes(c)) {

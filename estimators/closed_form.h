@@ -17,28 +17,28 @@ struct ClosedForm {
   static constexpr bool kNeedsOpticalDepth = true;
   static constexpr bool kNeedsInversion = true;
 
-  Claim claim(Quantity) const { return Claim::exact; }
+  Guarantee claim(Quantity) const { return Guarantee::exact; }
 
   struct Walk {
     Real depth = 0;  ///< optical depth of the collision
   };
 
-  void init(Walk& walk, const Passage<Value>&, Flight&, auto& rng) const { walk.depth = rng.exponential(); }
-  bool propose(Walk&, const Passage<Value>&, Flight&, auto&) const { return false; }
-  void consume(Walk&, const Passage<Value>&, const Flight&, const Value&, auto&) const {}
+  void init(Walk& walk, const MediumRay<Value>&, Flight&, auto& rng) const { walk.depth = rng.exponential(); }
+  bool propose(Walk&, const MediumRay<Value>&, Flight&, auto&) const { return false; }
+  void consume(Walk&, const MediumRay<Value>&, const Flight&, const Value&, auto&) const {}
 
-  Value result(const Walk&, const Passage<Value>& ray) const { return exponential(Value(-*ray.exact_depth)); }
-  Value optical_depth(const Walk&, const Passage<Value>& ray) const { return *ray.exact_depth; }
+  Value result(const Walk&, const MediumRay<Value>& ray) const { return exponential(Value(-*ray.exact_depth)); }
+  Value optical_depth(const Walk&, const MediumRay<Value>& ray) const { return *ray.exact_depth; }
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Passage<Value>& ray, const Flight&) const {
+  Event<Value> event(const Walk& walk, const MediumRay<Value>& ray, const Flight&) const {
     const Real distance = ray.distance_at_depth(walk.depth);
     if (distance < ray.end) return {EventKind::collision, distance, ray.value(1)};
     return {EventKind::escape, ray.end, ray.value(1)};
   }
 
-  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const {
+  Theory theory(const MediumRay<Value>&, const RayProfile&, int, Quantity) const {
     return {.variance = 0, .lookups = 0, .lookups_variance = 0};
   }
 };

@@ -95,7 +95,7 @@ struct Control {
 
 /// What a control that is no profile is in a segment.
 template <class Value>
-Value constant_control(const ControlChoice& choice, const Passage<Value>& ray, const Segment& segment, const Value& low,
+Value constant_control(const ControlChoice& choice, const MediumRay<Value>& ray, const Segment& segment, const Value& low,
                        const Value& high, const Value& average) {
   if (choice.kind == "average") return average;
   if (choice.kind == "middle") return (low + high) / 2;
@@ -115,7 +115,7 @@ Value constant_control(const ControlChoice& choice, const Passage<Value>& ray, c
 
 /// Control and residual rate of every segment of a ray.
 template <class Value>
-void prepare_control(const ControlChoice& choice, const Passage<Value>& ray, Control<Value>& control, Rates& residual) {
+void prepare_control(const ControlChoice& choice, const MediumRay<Value>& ray, Control<Value>& control, Rates& residual) {
   const auto value = [](const Spectrum& x) { return load<Value>(x.data(), static_cast<int>(x.size())); };
   control.of_segment.clear();
   control.depth_before.clear();

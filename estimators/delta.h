@@ -28,15 +28,15 @@ struct DeltaTracking {
                  "on chromatic media: one walk shared by the channels, or one walk per channel at its own majorant");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   bool flies_once(int channels) const { return walks == "shared" || channels == 1; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     std::vector<Rates> per_channel;  ///< empty where the channels share one walk
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.per_channel.clear();
     if (walks == "shared" || ray.channels == 1) return;
     ray.per_channel.resize(static_cast<std::size_t>(ray.channels));
@@ -98,12 +98,12 @@ struct DeltaTracking {
 
   Value result(const Walk& walk, const auto&) const { return walk.transmittance; }
 
-  Value transmittance_at(const Walk& walk, const Ray&, Real) const { return walk.transmittance; }
+  Value transmittance_at(const Walk& walk, const RayData&, Real) const { return walk.transmittance; }
 
   /// Channels that share a walk end apart.
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray, const Flight& at) const {
+  Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
     return {done(walk) ? EventKind::collision : EventKind::escape, at.position(), ray.value(1)};
   }
 
@@ -115,7 +115,7 @@ struct DeltaTracking {
   }
 
   /// Where the majorant is violated every collision is accepted: the walk sees min(mu, mub).
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     const auto rate = [&](int k, const RayProfile::Node& at) {
       return ray.per_channel.empty() ? ray.majorant.rate(at.piece) : ray.per_channel[static_cast<std::size_t>(k)].rate(at.piece);
     };

@@ -75,7 +75,7 @@ void hold(const std::shared_ptr<const Medium>& medium) {
           const std::string where =
               fmt::format("{} channels, {}, u = {} at draw {} of sample {}", walked.ray.channels, with, forced, at, sample);
           using Walked = HandWalked<E, Value>;
-          constexpr bool kTells = tells_events<E<Value>, typename Walked::Passage>();
+          constexpr bool kTells = tells_events<E<Value>, typename Walked::MediumRay>();
           constexpr SampleRange kRange = E<Value>::kRange;
           constexpr bool kAtMostOne = kRange == SampleRange::binary || kRange == SampleRange::unit;
           for (int c = 0; c < walked.ray.channels; ++c) {
@@ -112,9 +112,9 @@ void hold_in_float(const std::shared_ptr<const Medium>& medium) {
       for (const std::uint32_t end : {std::uint32_t{0}, ~std::uint32_t{0}}) {
         auto state = Streams::seeded({20261122, 0, 0});
         Streams rng(state, true);
-        typename LaneFlight<float, 1>::Course course;
+        typename LaneFlight<float, 1>::Rates rates;
         typename LaneFlight<float, 1>::Place place;
-        LaneFlight<float, 1> flight(course, place);
+        LaneFlight<float, 1> flight(rates, place);
         typename E<Pack>::Walk walk;
         flight.start(walked.ray.majorant);
         tracker.init(walk, walked.ray, flight, rng);

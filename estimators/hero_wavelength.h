@@ -24,7 +24,7 @@ struct HeroWavelengthTracking {
   static constexpr SampleRange kRange = std::is_same_v<Value, Real> ? SampleRange::unit : SampleRange::non_negative;
   static constexpr bool kNeedsBound = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     int hero = 0;
@@ -32,15 +32,15 @@ struct HeroWavelengthTracking {
     EventKind kind = EventKind::escape;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const {
     walk = {-1, ray.value(1), ray.throughput / average(ray.throughput), EventKind::escape};
   }
 
-  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const {
     return walk.kind == EventKind::escape && flight.next(rng);
   }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     if (walk.hero < 0) walk.hero = choose(walk.chance, ray.channels, rng);
     Value bounded = extinction;
     for (int c = 0; c < ray.channels; ++c) channel(bounded, c) = std::min(channel(extinction, c), at.rate());
@@ -60,18 +60,18 @@ struct HeroWavelengthTracking {
     walk.chance = mean > 0 ? Value(walk.chance / mean) : ray.value(0);
   }
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const {
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
     return walk.kind == EventKind::escape ? walk.contribution : ray.value(0);
   }
 
-  Event<Value> event(const Walk& walk, const Passage<Value>&, const Flight& at) const {
+  Event<Value> event(const Walk& walk, const MediumRay<Value>&, const Flight& at) const {
     return {walk.kind, at.position(), walk.contribution};
   }
 
-  int real_collisions(const Walk& walk, const Passage<Value>&) const { return walk.kind != EventKind::escape; }
+  int real_collisions(const Walk& walk, const MediumRay<Value>&) const { return walk.kind != EventKind::escape; }
 
   /// Where the majorant is violated the walk sees min(mu, mub).
-  Theory theory(const Passage<Value>& ray, const RayProfile& smooth, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
     Theory theory;
     if (!ray.draws_absorption) return theory;
@@ -114,7 +114,7 @@ struct HeroWavelengthTracking {
     return hero;
   }
 
-  static std::optional<Real> variance_of_constant(const Passage<Value>& ray, const RayProfile& profile, int c) {
+  static std::optional<Real> variance_of_constant(const MediumRay<Value>& ray, const RayProfile& profile, int c) {
     const Real depth = ray.majorant.total_depth();
     constexpr Real kDeepest = 1e5;
     if (profile.nodes(c).empty() || !(depth > 0)) return 0;

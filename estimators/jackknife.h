@@ -34,7 +34,7 @@ struct Jackknife {
     visit.choice("mean", mean, {"jackknife", "naive"}, "jackknife transmittance, or e^{-mean}");
   }
 
-  Claim claim(Quantity) const { return Claim::consistent; }
+  Guarantee claim(Quantity) const { return Guarantee::consistent; }
 
   SampleRange range() const { return mean == "naive" ? SampleRange::unit : kRange; }
 
@@ -44,12 +44,12 @@ struct Jackknife {
     return each ? 6 : 4;
   }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Real step = 0;
     bool stratified = false, naive = false;
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.step = ray.length() / steps;
     ray.stratified = jitter == "stratified";
     ray.naive = mean == "naive";
@@ -61,19 +61,19 @@ struct Jackknife {
     int done = 0, complete = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto&) const {
+  void init(Walk& walk, const RayData& ray, Flight&, auto&) const {
     walk.sum = walk.mean = walk.squares = ray.value(0);
     walk.done = walk.complete = 0;
   }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (!(ray.step > 0) || walk.complete == m) return false;
     if (ray.stratified || walk.done == 0) walk.offset = rng.uniform();
     flight.jump(ray.begin + (walk.done + walk.offset) * ray.step);
     return true;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData& ray, const Flight&, const Value& extinction, auto&) const {
     walk.sum += extinction;
     if (++walk.done < steps) return;
     const Value x = walk.sum * ray.step, ahead = x - walk.mean;
@@ -83,7 +83,7 @@ struct Jackknife {
     walk.done = 0;
   }
 
-  Value result(const Walk& walk, const Ray& ray) const {
+  Value result(const Walk& walk, const RayData& ray) const {
     Value transmittance = exponential(Value(-walk.mean));
     if (!ray.naive)
       for (int c = 0; c < ray.channels; ++c)
@@ -91,7 +91,7 @@ struct Jackknife {
     return transmittance;
   }
 
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     if (!(ray.step > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     Theory theory = jackknife_march(profile, c, m, steps, ray.stratified, ray.naive);
     theory.lookups = m * static_cast<Real>(steps);

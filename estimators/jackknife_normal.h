@@ -30,27 +30,27 @@ struct JackknifeNormal {
     visit.choice("mean", mean, {"jackknife", "naive"}, "jackknife transmittance, or e^{-mean}");
   }
 
-  Claim claim(Quantity) const { return mean == "naive" ? Claim::biased : Claim::unbiased; }
+  Guarantee claim(Quantity) const { return mean == "naive" ? Guarantee::biased : Guarantee::unbiased; }
 
   struct Walk {
     Real x = 0, y = 0;  ///< standard normal numbers
   };
 
-  void init(Walk& walk, const Passage<Value>&, Flight&, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>&, Flight&, auto& rng) const {
     const Real radius = std::sqrt(2 * rng.exponential()), angle = 2 * std::numbers::pi * rng.uniform();
     walk = {radius * std::cos(angle), radius * std::sin(angle)};
   }
 
-  bool propose(Walk&, const Passage<Value>&, Flight&, auto&) const { return false; }
-  void consume(Walk&, const Passage<Value>&, const Flight&, const Value&, auto&) const {}
+  bool propose(Walk&, const MediumRay<Value>&, Flight&, auto&) const { return false; }
+  void consume(Walk&, const MediumRay<Value>&, const Flight&, const Value&, auto&) const {}
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const {
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
     if (!(ray.length() > 0)) return ray.value(1);
     const Value naive = exponential(Value(-*ray.exact_depth)) * std::exp(-deviation * (walk.x + walk.y) / 2);
     return mean == "naive" ? naive : naive * jackknife_factor(2, deviation * std::abs(walk.x - walk.y) / 2);
   }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     if (!(ray.length() > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     const Real square = deviation * deviation, transmittance = std::exp(-profile.optical_depth(c));
     Theory theory{.lookups = 0, .lookups_variance = 0};

@@ -32,7 +32,7 @@ struct MajorantGuidedRatio {
                  "rate of the first flight: the majorant, or as looked up where the ray begins");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   SampleRange range() const { return start == "lookup" ? SampleRange::non_negative : kRange; }
 
@@ -60,7 +60,7 @@ struct MajorantGuidedRatio {
 
   Value result(const Walk& walk, const auto&) const { return walk.weight; }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     return guided_moments(ray.majorant, profile, c, kLeastRate, start == "lookup");
   }
 

@@ -14,19 +14,19 @@ struct MarchingInversion : RayMarching<Value> {
   static constexpr const char* kSource = "Perlin and Hoffert 1989";
 
   using Base = RayMarching<Value>;
-  using Ray = typename Base::Ray;
+  using RayData = typename Base::RayData;
 
   struct Walk : Base::Walk {
     Real target = 0, distance = kInfinity;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     Base::init(walk, ray, flight, rng);
     walk.target = rng.exponential();
     walk.distance = kInfinity;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     const Real before = channel(walk.sum, 0) * ray.step;
     Base::consume(walk, ray, at, extinction, rng);
     const Real after = channel(walk.sum, 0) * ray.step;
@@ -36,7 +36,7 @@ struct MarchingInversion : RayMarching<Value> {
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray, const Flight&) const {
+  Event<Value> event(const Walk& walk, const RayData& ray, const Flight&) const {
     if (walk.distance < kInfinity) return {EventKind::collision, std::min(walk.distance, ray.end), ray.value(1)};
     return {EventKind::escape, ray.end, ray.value(1)};
   }

@@ -24,7 +24,7 @@ struct BidirectionalMis {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   /// What one walk leaves behind: a vertex for its origin and for each collision.
   struct Prefix {
@@ -53,13 +53,13 @@ struct BidirectionalMis {
     bool turned = false;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const {
     walk.forwards.start(0, ray.value(1));
     walk.backwards.start(ray.majorant.total_depth(), ray.value(1));
     walk.turned = false;
   }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     const Real total = ray.majorant.total_depth();
     if (!walk.turned) {
       const Real depth = walk.forwards.depth.back() + rng.exponential();
@@ -80,14 +80,14 @@ struct BidirectionalMis {
     return flight.advance_to(depth);
   }
 
-  void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const MediumRay<Value>&, const Flight& at, const Value& extinction, auto&) const {
     std::vector<Value>& weight = (walk.turned ? walk.backwards : walk.forwards).weight;
     weight.push_back(weight.back() * ((at.rate() - extinction) / at.rate()));
   }
 
   /// Pairs are summed from the nearest outwards, until what is left of a vertex is lost in the rounding of the sum: their number
   /// grows as the depth, not as its square.
-  Value result(const Walk& walk, const Passage<Value>& ray) const {
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
     const Prefix &a = walk.forwards, &b = walk.backwards;
     Value sum = a.weight.back() / (2 + a.all_gaps) + b.weight.back() / (2 + b.all_gaps);
     Real heaviest = 0;
@@ -104,7 +104,7 @@ struct BidirectionalMis {
     return sum;
   }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile&, int, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile&, int, Quantity) const {
     const Real lookups = 2 * ray.majorant.total_depth();
     return {.lookups = lookups, .lookups_variance = lookups};
   }

@@ -18,7 +18,7 @@ struct UnidirectionalMis {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kLanes = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     Value weight, last, sum;  ///< W, W c of the last vertex, sum of W c
@@ -41,7 +41,7 @@ struct UnidirectionalMis {
 
   /// From a vertex, S = c + (c if the flight leaves, else a S of the next vertex), and the mean of the latter is T - c - v c, so
   /// g = c^2 + 2 c (T - v) + 3 v c^2 in vertex_sum_variance.  Nothing where the panels do not resolve v.
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int channel, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int channel, Quantity) const {
     Theory theory{.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
     if (!profile.resolved()) return theory;
     theory.variance = vertex_sum_variance(ray, profile, channel, [](Real depth_left, Real tau_left) {

@@ -16,7 +16,7 @@ struct MultiVolumeTracking : DeltaTracking<Value> {
   static constexpr bool kNeedsShares = true;
 
   using Base = DeltaTracking<Value>;
-  using Ray = typename Base::Ray;
+  using RayData = typename Base::RayData;
 
   void parameters(ParameterVisitor&) {}
 
@@ -30,12 +30,12 @@ struct MultiVolumeTracking : DeltaTracking<Value> {
     int picked = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     Base::init(walk, ray, flight, rng);
     walk.picked = 0;
   }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (!Base::propose(walk, ray, flight, rng)) return false;
     const Spectrum& share = ray.shares[flight.piece()];
     walk.picked = 0;

@@ -26,12 +26,12 @@ struct NextFlightDeltaTracking {
                  "a: weight 1 - mu/mub at every tentative collision; b: weight 1 at null collisions only");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     bool weigh_all = true;  ///< variant A
   };
-  void prepare(Ray& ray) const { ray.weigh_all = variant == "a"; }
+  void prepare(RayData& ray) const { ray.weigh_all = variant == "a"; }
 
   struct Walk {
     Value alive, sum;
@@ -61,7 +61,7 @@ struct NextFlightDeltaTracking {
   /// and I(y) = int_0^y mub c K, the sum beyond the first term has mean I(d) and second moment int mub (K c^2 + 2 c q (I(d) -
   /// I(y))) dy; in variant B c is added only by those that live on.  Holds where the majorant is violated, too: q = max(0, 1 -
   /// mu/mub), and the mean is then not T.
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     const auto rate = [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); };
     const auto killed = [&](int, const RayProfile::Node& at) { return std::min(at.extinction, rate(at)); };
     Theory theory;

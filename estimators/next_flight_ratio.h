@@ -15,7 +15,7 @@ struct NextFlightRatioTracking {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kLanes = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     Value weight, sum;
@@ -37,7 +37,7 @@ struct NextFlightRatioTracking {
 
   /// A vertex has v = exp(-majorant depth left) and g = v (2 T - v) in vertex_sum_variance.  Nothing where the panels do not
   /// resolve v.
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     Theory theory{.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
     if (!profile.resolved()) return theory;
     theory.variance = vertex_sum_variance(ray, profile, c, [](Real depth_left, Real tau_left) {

@@ -51,14 +51,14 @@ struct NullCollisionTracking {
                            "and scatter below 1 with roulette \"three\"");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   SampleRange range() const { return probabilities == "fixed" ? SampleRange::non_negative : kRange; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     bool fixed = false, three = false;
   };
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.fixed = probabilities == "fixed";
     ray.three = roulette == "three";
   }
@@ -68,13 +68,13 @@ struct NullCollisionTracking {
     EventKind kind = EventKind::escape;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape}; }
+  void init(Walk& walk, const RayData& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape}; }
 
-  bool propose(Walk& walk, const Ray&, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData&, Flight& flight, auto& rng) const {
     return walk.kind == EventKind::escape && flight.next(rng);
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     const Coefficients<Value> mu(extinction, ray.albedo, at.rate());
     const Chances chance = chances(ray, mu);
     const std::optional<EventKind> kind =
@@ -84,13 +84,13 @@ struct NullCollisionTracking {
     walk.weight = p > 0 ? Value(walk.weight * mu.of(*kind) / (at.rate() * p)) : ray.value(0);
   }
 
-  Value result(const Walk& walk, const Ray& ray) const { return walk.kind == EventKind::escape ? walk.weight : ray.value(0); }
+  Value result(const Walk& walk, const RayData& ray) const { return walk.kind == EventKind::escape ? walk.weight : ray.value(0); }
 
-  Event<Value> event(const Walk& walk, const Ray&, const Flight& at) const { return {walk.kind, at.position(), walk.weight}; }
+  Event<Value> event(const Walk& walk, const RayData&, const Flight& at) const { return {walk.kind, at.position(), walk.weight}; }
 
-  int real_collisions(const Walk& walk, const Ray&) const { return walk.kind != EventKind::escape; }
+  int real_collisions(const Walk& walk, const RayData&) const { return walk.kind != EventKind::escape; }
 
-  Theory theory(const Ray& ray, const RayProfile& smooth, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
     std::vector<Real> rate, through, death, growth;
     for (std::size_t j = 0; j < profile.nodes(c).size(); ++j) {
@@ -108,7 +108,7 @@ struct NullCollisionTracking {
   }
 
   /// E[w^2; collision] = int sum_k mu_k^2/(mub P_k) K dx over absorption and scattering.
-  Theory weight_theory(const Ray& ray, const RayProfile& smooth, int c) const {
+  Theory weight_theory(const RayData& ray, const RayProfile& smooth, int c) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
     std::vector<Real> growth, collisions;
     for (std::size_t j = 0; j < profile.nodes(c).size(); ++j) {
@@ -137,7 +137,7 @@ struct NullCollisionTracking {
   };
 
   /// Without absorption as an event its chance goes to the others.
-  Chances chances(const Ray& ray, const Coefficients<Value>& mu) const {
+  Chances chances(const RayData& ray, const Coefficients<Value>& mu) const {
     if (ray.fixed && ray.three) {
       const Real a = ray.draws_absorption ? absorb : 0;
       return {a, (1 - a) * scatter, (1 - a) * (1 - scatter) * null};

@@ -20,23 +20,23 @@ struct PowerSeriesCmf {
 
   static constexpr Real kShare = 0.99;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     PoissonTail tail;
     std::int64_t always = 0;  ///< n0
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.tail.set_up(ray.majorant.total_depth());
     ray.always = ray.majorant.total_depth() > 0 ? ray.tail.first_at_most(1 - kShare) : 0;
   }
 
   using Walk = SeriesWalk<Value>;
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const { walk.start(ray, rng); }
+  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const { walk.start(ray, rng); }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (++walk.lookups > ray.always) {
       const Real chance = ray.majorant.total_depth() / static_cast<Real>(walk.lookups);
       if (!(walk.u < chance)) return false;
@@ -46,15 +46,15 @@ struct PowerSeriesCmf {
     return true;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto&) const {
     const Real factor = walk.lookups > ray.always ? 1 : ray.majorant.total_depth() / static_cast<Real>(walk.lookups);
     walk.series.multiply(factor * null_ratio(at, extinction));
     walk.series.add();
   }
 
-  Value result(const Walk& walk, const Ray&) const { return walk.series.total(); }
+  Value result(const Walk& walk, const RayData&) const { return walk.series.total(); }
 
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     const SeriesMoments moments = series_moments(ray, profile, c);
     const auto always = static_cast<Real>(ray.always);
     const auto log_growth = [&](std::int64_t n) {

@@ -22,25 +22,25 @@ struct PowerSeriesCumulative {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk : SeriesWalk<Value> {
     bool done = false;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto& rng) const {
     walk.start(ray, rng);
     walk.done = !(ray.majorant.total_depth() > 0);
   }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     if (walk.done) return false;
     ++walk.lookups;
     land_anywhere(ray, flight, rng);
     return true;
   }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
     walk.series.multiply(ray.majorant.total_depth() / static_cast<Real>(walk.lookups) * null_ratio(at, extinction));
     const Real chance = walk.series.magnitude_to_one();
     walk.done = !(walk.u < chance);
@@ -50,9 +50,9 @@ struct PowerSeriesCumulative {
     walk.series.add();
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.series.total(); }
+  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.series.total(); }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     if (!(ray.majorant.total_depth() > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     const Ratios ratios = ratios_of(ray);
     if (ratios.constant) return theory_of_constant(ray, profile, c);
@@ -67,7 +67,7 @@ struct PowerSeriesCumulative {
     bool constant = true;  ///< every channel's
   };
 
-  static Ratios ratios_of(const Passage<Value>& ray) {
+  static Ratios ratios_of(const MediumRay<Value>& ray) {
     constexpr Real kRounding = 1e-12;
     Ratios ratios;
     std::optional<Spectrum> found;
@@ -83,7 +83,7 @@ struct PowerSeriesCumulative {
     return ratios;
   }
 
-  static Theory theory_of_constant(const Passage<Value>& ray, const RayProfile& profile, int c) {
+  static Theory theory_of_constant(const MediumRay<Value>& ray, const RayProfile& profile, int c) {
     const Real depth = ray.majorant.total_depth();
     const auto first = [&](int k) { return series_moments(ray, profile, k).first; };
     std::vector<Real> log_first, log_weight(static_cast<std::size_t>(ray.channels), 0), log_chances{0};
@@ -107,7 +107,7 @@ struct PowerSeriesCumulative {
     return theory;
   }
 
-  static Theory theory_of_roulette_throughout(const Passage<Value>& ray, const RayProfile& profile, int c) {
+  static Theory theory_of_roulette_throughout(const MediumRay<Value>& ray, const RayProfile& profile, int c) {
     const std::vector<RayProfile::Node>& nodes = profile.nodes(c);
     Real all = 0, own = 0;  // A, A_c
     for (std::size_t j = 0; j < nodes.size(); ++j) {

@@ -17,33 +17,33 @@ struct PowerSeriesNextFlight {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     PoissonTail tail;
   };
 
-  void prepare(Ray& ray) const { ray.tail.set_up(ray.majorant.total_depth()); }
+  void prepare(RayData& ray) const { ray.tail.set_up(ray.majorant.total_depth()); }
 
   using Walk = SeriesWalk<Value>;
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const { walk.start(ray, rng); }
+  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const { walk.start(ray, rng); }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (!(walk.u < ray.tail.at_least(walk.lookups + 1))) return false;
     ++walk.lookups;
     land_anywhere(ray, flight, rng);
     return true;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto&) const {
     walk.series.multiply(ray.majorant.total_depth() / static_cast<Real>(walk.lookups) * null_ratio(at, extinction));
     walk.series.add(ray.tail.at_least(walk.lookups));
   }
 
-  Value result(const Walk& walk, const Ray&) const { return walk.series.total(); }
+  Value result(const Walk& walk, const RayData&) const { return walk.series.total(); }
 
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     const SeriesMoments moments = series_moments(ray, profile, c);
     const auto log_growth = [&](std::int64_t i) {
       return static_cast<Real>(i) * std::log1p(moments.spread) - ray.tail.log_at_least(i);

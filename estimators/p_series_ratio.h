@@ -18,13 +18,13 @@ struct PowerSeriesRatio {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     PoissonTail tail;
   };
 
-  void prepare(Ray& ray) const { ray.tail.set_up(ray.majorant.total_depth()); }
+  void prepare(RayData& ray) const { ray.tail.set_up(ray.majorant.total_depth()); }
 
   struct Walk {
     Value weight;
@@ -32,25 +32,25 @@ struct PowerSeriesRatio {
     std::int64_t lookups = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const { walk = {ray.value(1), rng.uniform(), 0}; }
+  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const { walk = {ray.value(1), rng.uniform(), 0}; }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (!(walk.u < ray.tail.at_least(++walk.lookups))) return false;
     land_anywhere(ray, flight, rng);
     return true;
   }
 
-  void consume(Walk& walk, const Ray&, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData&, const Flight& at, const Value& extinction, auto&) const {
     walk.weight *= null_ratio(at, extinction);
   }
 
-  Value result(const Walk& walk, const Ray&) const { return walk.weight; }
+  Value result(const Walk& walk, const RayData&) const { return walk.weight; }
 
-  CountLaw count_law(const Ray& ray, const RayProfile& profile, int c) const {
+  CountLaw count_law(const RayData& ray, const RayProfile& profile, int c) const {
     return RatioTracking<Value>().count_law(ray, profile, c);
   }
 
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity quantity) const {
     return RatioTracking<Value>().theory(ray, profile, c, quantity);
   }
 };

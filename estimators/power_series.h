@@ -15,7 +15,7 @@ namespace nullmark {
 
 /// The next lookup: a point uniform in majorant depth.
 template <class Value>
-void land_anywhere(const Passage<Value>& ray, Flight& flight, auto& rng) {
+void land_anywhere(const MediumRay<Value>& ray, Flight& flight, auto& rng) {
   flight.start(ray.majorant);
   if (!flight.advance_to(rng.uniform() * ray.majorant.total_depth())) flight.advance_to(0);  // denormal depths round up
 }
@@ -31,7 +31,7 @@ Value null_ratio(const Flight& at, const Value& extinction) {
 template <class Value>
 class SeriesSum {
  public:
-  void start(const Passage<Value>& ray) {
+  void start(const MediumRay<Value>& ray) {
     weight_ = ray.value(1);
     sum_ = ray.value(0);
     scale_ = 0;
@@ -80,7 +80,7 @@ struct SeriesWalk {
   Real u = 0;  ///< uniform, given that the walk has come so far
   std::int64_t lookups = 0;
 
-  void start(const Passage<Value>& ray, auto& rng) {
+  void start(const MediumRay<Value>& ray, auto& rng) {
     series.start(ray);
     u = rng.uniform();
     lookups = 0;
@@ -119,7 +119,7 @@ struct SeriesMoments {
   Real spread = 0;  ///< M int (mub - mu)^2/mub over first^2, less 1
 };
 template <class Value>
-SeriesMoments series_moments(const Passage<Value>& ray, const RayProfile& profile, int c);
+SeriesMoments series_moments(const MediumRay<Value>& ray, const RayProfile& profile, int c);
 
 /// Variance of X = e^{-M} sum_{i<=K} W_i/P_i.  With t_i = e^{-M} first^i/i! and E[W_i^2/P_i] = growth_i (first^i/i!)^2, later
 /// factors being independent, Var X = sum_i (growth_i - 1) t_i^2 (2 B_i - 1), B_i = sum_{j>=i} t_j/t_i = 1 + first/(i+1) B_{i+1}:
@@ -131,7 +131,7 @@ std::optional<Real> series_variance(Real depth, Real first, const std::function<
 Real last_poisson_term(const SeriesMoments& moments);
 
 template <class Value>
-SeriesMoments series_moments(const Passage<Value>& ray, const RayProfile& profile, int c) {
+SeriesMoments series_moments(const MediumRay<Value>& ray, const RayProfile& profile, int c) {
   SeriesMoments moments{.depth = ray.majorant.total_depth()};
   if (!(moments.depth > 0)) return moments;
   const auto rate = [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); };

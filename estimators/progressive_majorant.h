@@ -36,7 +36,7 @@ struct ProgressiveMajorant {
     visit.number("margin", margin, Range::non_negative(), "1/length", "what a violated bound is raised above the extinction");
   }
 
-  Claim claim(Quantity) const { return Claim::consistent; }
+  Guarantee claim(Quantity) const { return Guarantee::consistent; }
 
   struct Walk {
     Value weight;
@@ -46,13 +46,13 @@ struct ProgressiveMajorant {
     int pass = 0;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const {
     walk.bounds.assign(ray.majorant.size(), initial);
     walk.pass = 0;
     begin_pass(walk, ray);
   }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     for (;;) {
       if (!vanished(walk.weight) && fly(walk, ray, rng)) {
         flight.jump(walk.position);
@@ -64,17 +64,17 @@ struct ProgressiveMajorant {
     }
   }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight&, const Value& extinction, auto&) const {
     const Real bound = walk.bounds[walk.cell];
     for (int c = 0; c < ray.channels; ++c) channel(walk.weight, c) *= std::max<Real>(0, bound - channel(extinction, c)) / bound;
     if (const Real most = largest(extinction); most > bound) walk.bounds[walk.cell] = most + margin;
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.weight; }
 
   /// Of the first pass of one channel, whose bounds are given: the mean is clamped, its relative variance exp(int min(mu, B)^2/B)
   /// - 1; lookups int B e^{-int B [mu > B]}, as those end the walk.
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     if (passes > 0 || ray.channels > 1) return {};
     Rates level;
     level.start(ray.begin);
@@ -90,14 +90,14 @@ struct ProgressiveMajorant {
   }
 
  private:
-  static void begin_pass(Walk& walk, const Passage<Value>& ray) {
+  static void begin_pass(Walk& walk, const MediumRay<Value>& ray) {
     walk.weight = ray.value(1);
     walk.cell = 0;
     walk.position = ray.begin;
   }
 
   /// To the next lookup; false where it lies beyond the ray.
-  static bool fly(Walk& walk, const Passage<Value>& ray, auto& rng) {
+  static bool fly(Walk& walk, const MediumRay<Value>& ray, auto& rng) {
     Real depth = rng.exponential();
     for (; walk.cell < walk.bounds.size(); ++walk.cell) {
       const Real bound = walk.bounds[walk.cell], room = bound * (ray.majorant.end(walk.cell) - walk.position);

@@ -9,12 +9,12 @@ namespace nullmark {
 namespace {
 
 std::vector<CellRecord> run_of(const std::string& estimator, const std::string& medium, std::uint64_t samples) {
-  return run_untimed(read_config(
-      R"({"$schema":"nullmark/config/1","name":"t","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",)"
-      R"("samples_per_ray":)" +
-          std::to_string(samples) + R"(,"gate":{"enabled":false},"matrix":{"estimator":)" + estimator + R"(,"medium":)" + medium +
-          "}}]}",
-      "t.json"));
+  return run_untimed(
+      read_config(R"({"nullmark":"config/2","name":"t","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",)"
+                  R"("samples_per_ray":)" +
+                      std::to_string(samples) + R"(,"verdict":{"enabled":false},"matrix":{"estimator":)" + estimator +
+                      R"(,"medium":)" + medium + "}}]}",
+                  "t.json"));
 }
 
 /// The march of one step and all differences make T: E e^{-v(o)} + sum_n E D_n, whose levels beyond 10 are below 1e-9 here.

@@ -10,21 +10,21 @@ namespace nullmark {
 template <class Value>
 struct PublishedDecompositionTracking : AnalogDecompositionTracking<Value> {
   using Base = AnalogDecompositionTracking<Value>;
-  using typename Base::Ray, typename Base::Walk;
+  using typename Base::RayData, typename Base::Walk;
 
   static constexpr const char* kName = "analog_decomposition_published_reset";
   static constexpr const char* kSummary = "decomposition tracking with a listing's residual path that starts anew (biased)";
   static constexpr const char* kSource = "Kutz, Habel, Li, Novak 2017, Sec. 4.1, as a set of notes lists it";
   static constexpr bool kNeedsBound = false;
 
-  Claim claim(Quantity) const { return Claim::biased; }
+  Guarantee claim(Quantity) const { return Guarantee::biased; }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     flight.start(ray.residual);
     return Base::propose(walk, ray, flight, rng);
   }
 
-  Theory theory(const Ray&, const RayProfile&, int, Quantity) const { return {}; }
+  Theory theory(const RayData&, const RayProfile&, int, Quantity) const { return {}; }
 };
 
 }  // namespace nullmark

@@ -16,15 +16,15 @@ struct PublishedNextFlightRatioTracking : NextFlightRatioTracking<Value> {
 
   using Walk = typename NextFlightRatioTracking<Value>::Walk;
 
-  Claim claim(Quantity) const { return Claim::biased; }
+  Guarantee claim(Quantity) const { return Guarantee::biased; }
 
-  bool propose(Walk&, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk&, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     if (!(ray.length() > 0)) return false;
     const Real step = -std::log(1 - rng.uniform() / flight.rate());
     return flight.advance_to(flight.depth() + step * flight.rate());
   }
 
-  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const { return {}; }
+  Theory theory(const MediumRay<Value>&, const RayProfile&, int, Quantity) const { return {}; }
 };
 
 }  // namespace nullmark

@@ -20,7 +20,7 @@ struct PublishedRatioTracking {
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
 
-  Claim claim(Quantity) const { return Claim::biased; }
+  Guarantee claim(Quantity) const { return Guarantee::biased; }
 
   struct Walk {
     Value weight;
@@ -28,7 +28,7 @@ struct PublishedRatioTracking {
     int count = 0;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto& rng) const {
     walk = {ray.value(1), 1.f + 0.31f * static_cast<float>(rng.sample()), 0};
   }
 
@@ -41,16 +41,16 @@ struct PublishedRatioTracking {
     return fraction((p[0] + p[1]) * p[2] * 20.f);
   }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto&) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto&) const {
     const float u = hash(ray.entry, static_cast<float>(walk.count++) + walk.frame_time);
     return flight.advance_to(flight.depth() - std::log(1 - static_cast<Real>(u)));
   }
 
-  void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const MediumRay<Value>&, const Flight& at, const Value& extinction, auto&) const {
     walk.weight *= (at.rate() - extinction) / at.rate();
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.weight; }
 };
 
 }  // namespace nullmark

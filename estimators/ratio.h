@@ -15,7 +15,7 @@ struct RatioTracking {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kLanes = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     Value weight;
@@ -31,10 +31,10 @@ struct RatioTracking {
 
   Value result(const Walk& walk, const auto&) const { return walk.weight; }
 
-  Value transmittance_at(const Walk& walk, const Passage<Value>&, Real) const { return walk.weight; }
+  Value transmittance_at(const Walk& walk, const MediumRay<Value>&, Real) const { return walk.weight; }
 
   /// Partial expectations E[X; K = k] = e^{-M} (int (mub - mu))^k / k!, and of X^2 with (mub - mu)^2/mub.
-  CountLaw count_law(const Passage<Value>& ray, const RayProfile& profile, int c) const {
+  CountLaw count_law(const MediumRay<Value>& ray, const RayProfile& profile, int c) const {
     const Real depth = ray.majorant.total_depth();
     const auto weight = [&](const RayProfile::Node& at) {
       const Real rate = ray.majorant.rate(at.piece);
@@ -48,7 +48,7 @@ struct RatioTracking {
     return {depth, 1, moment(1), moment(2)};
   }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     const Real spread = profile.integrate(c, [&](const RayProfile::Node& at) {
       return at.extinction > 0 ? at.extinction * at.extinction / ray.majorant.rate(at.piece) : 0;
     });

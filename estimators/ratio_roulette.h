@@ -27,25 +27,25 @@ struct RatioRoulette {
     if (survival < threshold) throw ParameterError("survival", "survival is below the threshold; weights would exceed 1");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     Value weight;
     bool ended = false;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), false}; }
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), false}; }
 
-  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const { return !walk.ended && flight.next(rng); }
+  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const { return !walk.ended && flight.next(rng); }
 
-  void consume(Walk& walk, const Passage<Value>&, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>&, const Flight& at, const Value& extinction, auto& rng) const {
     walk.weight *= (at.rate() - extinction) / at.rate();
     if (!(largest(magnitude(walk.weight)) < threshold)) return;
     walk.ended = !(rng.uniform() < survival);
     walk.weight *= walk.ended ? 0 : 1 / survival;
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.weight; }
 };
 
 }  // namespace nullmark

@@ -30,8 +30,8 @@ struct RayMarching {
 
   bool jittered() const { return offset == "uniform" || offset == "stratified"; }
 
-  Claim claim(Quantity quantity) const {
-    return quantity == Quantity::optical_depth && jittered() ? Claim::unbiased : Claim::consistent;
+  Guarantee claim(Quantity quantity) const {
+    return quantity == Quantity::optical_depth && jittered() ? Guarantee::unbiased : Guarantee::consistent;
   }
 
   /// |bias| ~ h^order on smooth media; a jittered march is biased for T by T Var(tau)/2, and Var(tau) is of order h^2 and h^3.
@@ -40,12 +40,12 @@ struct RayMarching {
     return offset == "midpoint" || offset == "uniform" ? 2 : 1;
   }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Real step = 0, fixed = 0;
     bool uniform = false, stratified = false;
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.step = ray.length() / steps;
     ray.fixed = offset == "left" ? 0 : offset == "right" ? 1 : 0.5;
     ray.uniform = offset == "uniform";
@@ -76,7 +76,7 @@ struct RayMarching {
   Value optical_depth(const Walk& walk, const auto& ray) const { return walk.sum * ray.step; }
   Value result(const Walk& walk, const auto& ray) const { return exponential(Value(-walk.sum * ray.step)); }
 
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity quantity) const {
     if (!(ray.step > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     Theory theory = ray.stratified ? stratified_march(profile, c, steps, quantity)
                     : ray.uniform  ? uniform_march(profile, c, steps, quantity)

@@ -18,7 +18,7 @@ struct RegularTracking {
   static constexpr bool kIgnoresMajorant = true;
   static constexpr bool kNeedsKnots = true;
 
-  Claim claim(Quantity) const { return Claim::exact; }
+  Guarantee claim(Quantity) const { return Guarantee::exact; }
 
   struct Walk {
     Value depth;
@@ -26,14 +26,14 @@ struct RegularTracking {
     int point = -1;
   };
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     const GaussRule* rule = nullptr;
   };
-  void prepare(Ray& ray) const { ray.rule = &gauss_rule(*ray.degree); }
+  void prepare(RayData& ray) const { ray.rule = &gauss_rule(*ray.degree); }
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto&) const { walk = {ray.value(0), 0, -1}; }
+  void init(Walk& walk, const RayData& ray, Flight&, auto&) const { walk = {ray.value(0), 0, -1}; }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto&) const {
     if (++walk.point == ray.rule->size()) {
       walk.point = 0;
       ++walk.piece;
@@ -44,15 +44,15 @@ struct RegularTracking {
     return true;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData& ray, const Flight&, const Value& extinction, auto&) const {
     const Real width = ray.knots[walk.piece + 1] - ray.knots[walk.piece];
     walk.depth += extinction * (width * ray.rule->weight[static_cast<std::size_t>(walk.point)]);
   }
 
-  Value result(const Walk& walk, const Ray&) const { return exponential(Value(-walk.depth)); }
-  Value optical_depth(const Walk& walk, const Ray&) const { return walk.depth; }
+  Value result(const Walk& walk, const RayData&) const { return exponential(Value(-walk.depth)); }
+  Value optical_depth(const Walk& walk, const RayData&) const { return walk.depth; }
 
-  Theory theory(const Ray& ray, const RayProfile&, int, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile&, int, Quantity) const {
     const std::size_t pieces = ray.knots.size() < 2 ? 0 : ray.knots.size() - 1;
     return {.variance = 0, .lookups = static_cast<Real>(pieces) * ray.rule->size(), .lookups_variance = 0};
   }

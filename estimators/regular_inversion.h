@@ -19,12 +19,12 @@ struct RegularInversion {
   static constexpr bool kIgnoresMajorant = true;
   static constexpr bool kNeedsKnots = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     const GaussRule* rule = nullptr;
   };
-  void prepare(Ray& ray) const { ray.rule = &gauss_rule(std::min(2 * *ray.degree, kMostDegree)); }
+  void prepare(RayData& ray) const { ray.rule = &gauss_rule(std::min(2 * *ray.degree, kMostDegree)); }
 
   struct Walk {
     Value depth;
@@ -35,7 +35,7 @@ struct RegularInversion {
     std::array<Real, kMostDegree / 2 + 1> extinction{};  ///< of a grey walk, in its cell
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const {
     walk.depth = ray.value(0);
     walk.target = rng.exponential();
     walk.before = 0;
@@ -44,7 +44,7 @@ struct RegularInversion {
     walk.distance = kInfinity;
   }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto&) const {
     if (++walk.point == ray.rule->size()) {
       if (!(smallest(walk.depth) < walk.target)) {
         if (ray.channels == 1) walk.distance = invert(walk, ray);
@@ -60,13 +60,13 @@ struct RegularInversion {
     return true;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData& ray, const Flight&, const Value& extinction, auto&) const {
     const auto point = static_cast<std::size_t>(walk.point);
     walk.extinction[point] = channel(extinction, 0);
     walk.depth += extinction * ((ray.knots[walk.piece + 1] - ray.knots[walk.piece]) * ray.rule->weight[point]);
   }
 
-  Value result(const Walk& walk, const Ray& ray) const {
+  Value result(const Walk& walk, const RayData& ray) const {
     Value escaped = ray.value(0);
     for (int c = 0; c < ray.channels; ++c) channel(escaped, c) = channel(walk.depth, c) < walk.target;
     return escaped;
@@ -74,13 +74,13 @@ struct RegularInversion {
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray, const Flight&) const {
+  Event<Value> event(const Walk& walk, const RayData& ray, const Flight&) const {
     if (walk.distance < kInfinity) return {EventKind::collision, walk.distance, ray.value(1)};
     return {EventKind::escape, ray.end, ray.value(1)};
   }
 
   /// A cell is looked up whole where the thinnest channel's depth at its beginning is below the exponential.
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     const Real depth = profile.optical_depth(c);
     Theory theory{.variance = std::exp(-depth) * -std::expm1(-depth)};
     Real mean = 0, square = 0;
@@ -104,7 +104,7 @@ struct RegularInversion {
 
  private:
   /// The root of int_0^x p = what is left, over the cell's width, with p in Legendre polynomials of 2x - 1.
-  static Real invert(const Walk& walk, const Ray& ray) {
+  static Real invert(const Walk& walk, const RayData& ray) {
     const std::size_t count = ray.rule->point.size();
     std::array<Real, kMostDegree / 2 + 1> coefficient{};
     const Real a = ray.knots[walk.piece], width = ray.knots[walk.piece + 1] - a;

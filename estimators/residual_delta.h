@@ -29,15 +29,15 @@ struct ResidualDeltaTracking {
       throw ParameterError("value", "control exceeds the medium's least extinction; residual delta tracking needs mu_c <= mu");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Control<Value> control;
     Rates residual;
   };
 
   /// The rate is what the majorant leaves above the smallest control of all channels, so that a loose majorant stays loose.
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     prepare_control<Value>(choice, ray, ray.control, ray.residual);
     ray.residual.start(ray.begin, ray.bounds.crossing);
     for (std::size_t i = 0; i < ray.bounds.segments.size(); ++i) {
@@ -67,14 +67,14 @@ struct ResidualDeltaTracking {
 
   Value result(const Walk& walk, const auto& ray) const { return exponential(Value(-ray.control.depth)) * walk.transmittance; }
 
-  Value transmittance_at(const Walk& walk, const Ray& ray, Real distance) const {
+  Value transmittance_at(const Walk& walk, const RayData& ray, Real distance) const {
     return exponential(Value(-ray.control.depth_to(distance))) * walk.transmittance;
   }
 
   auto real_collisions(const Walk& walk, const auto&) const { return walk.done; }
 
   /// Where the rate is violated every collision is accepted: the walk sees min(mu - mu_c, mubr).
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     const auto rate = [&](const RayProfile::Node& at) { return ray.residual.rate(at.piece); };
     const auto killed = [&](int k, const RayProfile::Node& at) {
       return std::clamp<Real>(at.extinction - channel(ray.control.at(at.t, at.piece), k), 0, rate(at));

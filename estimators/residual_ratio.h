@@ -37,18 +37,18 @@ struct ResidualRatioTracking {
       throw ParameterError("value", "an exponential control needs value and value_end above zero");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   SampleRange range() const { return choice.rate_scale < 1 ? SampleRange::any_sign : kRange; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Control<Value> control;
     Rates residual;
     bool with_control = true, with_residual = true;
     int roots = 0, roots_in_float = 0;
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     prepare_control<Value>(choice, ray, ray.control, ray.residual);
     ray.with_control = component != "residual";
     ray.with_residual = component != "control";
@@ -82,17 +82,17 @@ struct ResidualRatioTracking {
     return product(Value(-ray.control.depth), walk.weight, roots(ray));
   }
 
-  Value transmittance_at(const Walk& walk, const Ray& ray, Real distance) const {
+  Value transmittance_at(const Walk& walk, const RayData& ray, Real distance) const {
     return product(Value(-ray.control.depth_to(distance)), walk.weight, roots(ray));
   }
 
-  Value expected(const Value& tau, const Ray& ray) const {
+  Value expected(const Value& tau, const RayData& ray) const {
     const Value residual = ray.with_residual ? Value(tau - ray.control.depth) : ray.value(0);
     return exponential(Value(ray.with_control ? Value(-residual - ray.control.depth) : Value(-residual)));
   }
 
   /// The residual's partial expectations: E[X; K = k] = T_c e^{-M} (int (mubr - (mu - mu_c)))^k / k!, M = int mubr.
-  CountLaw count_law(const Ray& ray, const RayProfile& profile, int c) const {
+  CountLaw count_law(const RayData& ray, const RayProfile& profile, int c) const {
     const Real depth = ray.residual.total_depth();
     const auto moment = [&](int power) {
       return profile.integrate(c, [&](const RayProfile::Node& at) {
@@ -104,7 +104,7 @@ struct ResidualRatioTracking {
     return {ray.with_residual ? depth : 0, control, moment(1), moment(2)};
   }
 
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     if (!ray.with_residual) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     const Real spread = profile.integrate(c, [&](const RayProfile::Node& at) {
       const Real rest = at.extinction - channel(ray.control.at(at.t, at.piece), c), rate = ray.residual.rate(at.piece);

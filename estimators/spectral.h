@@ -19,7 +19,7 @@ namespace nullmark {
 ///   history_aware_average  R_k = avg_l |w_l mu_k,l|: avg_l w_l = 1 always, so that w_l <= the number of channels, where mub
 ///   bounds
 ///
-/// w_l includes what the path's earlier flights have made of it (Passage::throughput).  With `control` the segment's minimum is
+/// w_l includes what the path's earlier flights have made of it (MediumRay::throughput).  With `control` the segment's minimum is
 /// split off (spectral decomposition): first control against rest, mu_c against mub - mu_c in the scheme's own measure, and only
 /// the rest costs a lookup.  Unbiased for any mub > 0.  Without history E[X^2] = exp(-int mub (1 - mu_n^2/(mub^2 P_n))), lookups
 /// int mub exp(-int_0^x mub (1 - P_n)); history-aware average has the lookups int mub avg_l T_l(0,x).  On grey media it is
@@ -41,17 +41,17 @@ struct SpectralTracking {
                  "minimum: collisions of the segment's least extinction take no lookup (spectral decomposition)");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   /// Collisions of the control are no lookups.
   bool flies_once(int) const { return control == "none"; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     bool by_maximum = false, by_history = false;
     std::vector<Value> control, excess;  ///< per segment: the control, and the most by which the extinction exceeds it
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.by_maximum = scheme == "maximum" || scheme == "history_aware_maximum";
     ray.by_history = scheme == "history_aware_maximum" || scheme == "history_aware_average";
     ray.control.clear();
@@ -70,9 +70,9 @@ struct SpectralTracking {
     bool looked_up = false;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape, 1, false}; }
+  void init(Walk& walk, const RayData& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape, 1, false}; }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (walk.kind != EventKind::escape || !flight.next(rng)) return false;
     if (ray.control.empty()) return true;
     const Value& mu_c = ray.control[flight.piece()];
@@ -88,7 +88,7 @@ struct SpectralTracking {
     return false;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     Coefficients<Value> mu(extinction, ray.albedo, at.rate());
     if (!ray.control.empty()) mu = residual(ray, mu, at.piece());
     const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : 0,
@@ -99,13 +99,13 @@ struct SpectralTracking {
     take(walk, ray, mu, at.rate() * walk.lookup_chance, kind, absorb, scatter, null);
   }
 
-  Value result(const Walk& walk, const Ray& ray) const { return walk.kind == EventKind::escape ? walk.weight : ray.value(0); }
+  Value result(const Walk& walk, const RayData& ray) const { return walk.kind == EventKind::escape ? walk.weight : ray.value(0); }
 
-  Event<Value> event(const Walk& walk, const Ray&, const Flight& at) const { return {walk.kind, at.position(), walk.weight}; }
+  Event<Value> event(const Walk& walk, const RayData&, const Flight& at) const { return {walk.kind, at.position(), walk.weight}; }
 
-  int real_collisions(const Walk& walk, const Ray&) const { return walk.looked_up; }
+  int real_collisions(const Walk& walk, const RayData&) const { return walk.looked_up; }
 
-  Theory theory(const Ray& ray, const RayProfile& smooth, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
     if (!ray.by_history || ray.channels == 1) return theory_without_history(ray, profile, c);
     if (is_constant(ray, profile)) return theory_of_constant(ray, profile, c);
@@ -124,7 +124,7 @@ struct SpectralTracking {
   }
 
   /// On grey media all weights are 1 where the rate bounds.
-  Theory weight_theory(const Ray& ray, const RayProfile& profile, int c) const {
+  Theory weight_theory(const RayData& ray, const RayProfile& profile, int c) const {
     Theory theory = this->theory(ray, profile, c, Quantity::free_path);
     theory.mean = theory.variance = {};
     if (ray.channels > 1) return theory;
@@ -136,13 +136,13 @@ struct SpectralTracking {
 
  private:
   /// R_k of the scheme.
-  static Real measure(const Ray& ray, const Value& weight, const Value& coefficient) {
+  static Real measure(const RayData& ray, const Value& weight, const Value& coefficient) {
     const Value x = magnitude(ray.by_history ? Value(ray.throughput * weight * coefficient) : coefficient);
     return ray.by_maximum ? largest(x) : average(x);
   }
 
   /// The rest is at least what the segment's bounds allow, also under a rate that does not exceed the control.
-  static Real lookup_chance(const Ray& ray, const Value& weight, Real mub, std::size_t piece) {
+  static Real lookup_chance(const RayData& ray, const Value& weight, Real mub, std::size_t piece) {
     const Value& mu_c = ray.control[piece];
     const Coefficients<Value> mu(mu_c, ray.albedo, mub);
     Value least = magnitude(mu.null);
@@ -151,7 +151,7 @@ struct SpectralTracking {
     return own > 0 ? rest / (own + rest) : 1;
   }
 
-  static Coefficients<Value> residual(const Ray& ray, Coefficients<Value> mu, std::size_t piece) {
+  static Coefficients<Value> residual(const RayData& ray, Coefficients<Value> mu, std::size_t piece) {
     const Coefficients<Value> control(ray.control[piece], ray.albedo, 0);
     mu.absorb -= control.absorb;
     mu.scatter -= control.scatter;
@@ -159,7 +159,7 @@ struct SpectralTracking {
   }
 
   /// w_l *= mu_k,l/(rate P_k); nothing is left where absorption, not an event, took all.
-  static void take(Walk& walk, const Ray& ray, const Coefficients<Value>& mu, Real rate, EventKind kind, Real absorb,
+  static void take(Walk& walk, const RayData& ray, const Coefficients<Value>& mu, Real rate, EventKind kind, Real absorb,
                    Real scatter, Real null) {
     const Real own = kind == EventKind::absorb ? absorb : kind == EventKind::scatter ? scatter : null;
     const Real sum = absorb + scatter + null;
@@ -176,7 +176,7 @@ struct SpectralTracking {
     Real lookup = 1, null = 0;
     Value factor;
 
-    Step(const Ray& ray, const Value& weight, const Value& extinction, std::size_t piece) : factor(ray.value(0)) {
+    Step(const RayData& ray, const Value& weight, const Value& extinction, std::size_t piece) : factor(ray.value(0)) {
       const Real mub = ray.majorant.rate(piece);
       if (!(mub > 0)) return;
       Coefficients<Value> mu(extinction, ray.albedo, mub);
@@ -192,13 +192,13 @@ struct SpectralTracking {
     }
   };
 
-  static Value extinction_at(const Ray& ray, const RayProfile& profile, std::size_t node) {
+  static Value extinction_at(const RayData& ray, const RayProfile& profile, std::size_t node) {
     Value extinction = ray.value(0);
     for (int l = 0; l < ray.channels; ++l) channel(extinction, l) = profile.nodes(l)[node].extinction;
     return extinction;
   }
 
-  static Theory theory_without_history(const Ray& ray, const RayProfile& profile, int c) {
+  static Theory theory_without_history(const RayData& ray, const RayProfile& profile, int c) {
     std::vector<Real> rate, through, death, growth;
     for (std::size_t j = 0; j < profile.nodes(c).size(); ++j) {
       const std::size_t piece = profile.nodes(c)[j].piece;
@@ -213,7 +213,7 @@ struct SpectralTracking {
     return theory_of_escape_weight(profile, c, rate, through, death, growth);
   }
 
-  static bool is_constant(const Ray& ray, const RayProfile& profile) {
+  static bool is_constant(const RayData& ray, const RayProfile& profile) {
     for (int l = 0; l < ray.channels; ++l)
       for (const RayProfile::Node& at : profile.nodes(l)) {
         const RayProfile::Node& first = profile.nodes(l)[0];
@@ -225,7 +225,7 @@ struct SpectralTracking {
 
   /// On a constant medium the weight after k null collisions is one number, and so is the chance Q_k to come that far: E[X^2] =
   /// sum_k Poisson(M; k) Q_k w_k^2, lookups sum_k P(Poisson(M) > k) Q_k P(lookup), their square with 2k + 1.
-  static Theory theory_of_constant(const Ray& ray, const RayProfile& profile, int c) {
+  static Theory theory_of_constant(const RayData& ray, const RayProfile& profile, int c) {
     const Real depth = ray.majorant.total_depth();
     constexpr Real kDeepest = 1e5;
     if (profile.nodes(c).empty() || !(depth > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};

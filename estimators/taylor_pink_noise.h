@@ -30,9 +30,9 @@ struct TaylorPinkNoise {
     visit.number("c", c, {0, 0.99, true}, "", "relative deviation C of the noise; T = (1 + tau C^2)^{-1/C^2}");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  Value expected(const Value& tau, const Passage<Value>& ray) const {
+  Value expected(const Value& tau, const MediumRay<Value>& ray) const {
     Value target = tau;
     for (int i = 0; i < ray.channels; ++i) channel(target, i) = attenuation(channel(tau, i));
     return target;
@@ -43,9 +43,9 @@ struct TaylorPinkNoise {
     Real order = 0;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), ray.value(1), 0}; }
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), ray.value(1), 0}; }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     const Real depth = ray.majorant.total_depth();
     ++walk.order;
     if (!(depth > 0) || !(rng.uniform() * walk.order < 1 + (walk.order - 1) * c * c)) return false;
@@ -53,14 +53,14 @@ struct TaylorPinkNoise {
     return flight.advance_to(rng.uniform() * depth);
   }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
     walk.product *= (at.rate() - extinction) / at.rate() * scale(ray);
     walk.sum += walk.product;
   }
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const { return walk.sum * attenuation(ray.majorant.total_depth()); }
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const { return walk.sum * attenuation(ray.majorant.total_depth()); }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int i, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int i, Quantity) const {
     const Real depth = ray.majorant.total_depth();
     if (!(depth > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     const auto moment = [&](int power) {
@@ -87,7 +87,7 @@ struct TaylorPinkNoise {
 
  private:
   Real attenuation(Real tau) const { return std::exp(-std::log1p(tau * c * c) / (c * c)); }
-  Real scale(const Passage<Value>& ray) const {
+  Real scale(const MediumRay<Value>& ray) const {
     const Real depth = ray.majorant.total_depth();
     return depth / (1 + depth * c * c);
   }

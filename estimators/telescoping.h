@@ -30,14 +30,14 @@ struct Telescoping {
                  "p(n) = r (1 - r)^n; mean lookups are finite above 1/2, variances of smooth media below 15/16");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     Value base, even, odd;  ///< sums of e^{-v_i}, and of mu at even and at odd i
     Real offset = 0, done = 0, count = 0, probability = 1;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto& rng) const {
     walk.base = walk.even = walk.odd = ray.value(0);
     const Real n = std::floor(rng.exponential() / -std::log1p(-r));
     walk.count = std::exp2(n + 1);
@@ -46,19 +46,19 @@ struct Telescoping {
     walk.done = 0;
   }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto&) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto&) const {
     if (!(ray.length() > 0) || walk.done == walk.count) return false;
     flight.jump(ray.begin + (walk.offset + walk.done) / walk.count * ray.length());
     return true;
   }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight&, const Value& extinction, auto&) const {
     walk.base += exponential(Value(-extinction * ray.length()));
     (std::fmod(walk.done, 2) == 0 ? walk.even : walk.odd) += extinction;
     ++walk.done;
   }
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const {
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
     if (!(ray.length() > 0)) return ray.value(1);
     const Real of_half = ray.length() / (walk.count / 2);
     Value transmittance = walk.base / walk.count;
@@ -68,7 +68,7 @@ struct Telescoping {
     return transmittance;
   }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     if (!(ray.length() > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     const Real squares = 4 * (1 - r) < 1 ? 4 * r / (1 - 4 * (1 - r)) : kInfinity;
     const Real lookups = 2 * r / (2 * r - 1);

@@ -29,14 +29,14 @@ struct TelescopingDifference {
     visit.choice("marches", marches, {"correlated", "independent"}, "both from the same lookups, or each with its own");
   }
 
-  Claim claim(Quantity) const { return Claim::biased; }
+  Guarantee claim(Quantity) const { return Guarantee::biased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Real steps = 2;  ///< of the finer march
     bool correlated = true;
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.steps = std::exp2(level + 1);
     ray.correlated = marches == "correlated";
   }
@@ -46,9 +46,9 @@ struct TelescopingDifference {
     Real offset = 0, done = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const { walk = {ray.value(0), ray.value(0), rng.uniform(), 0}; }
+  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const { walk = {ray.value(0), ray.value(0), rng.uniform(), 0}; }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     const Real fine = ray.steps, all = ray.correlated ? fine : 1.5 * fine;
     if (!(ray.length() > 0) || walk.done == all) return false;
     if (walk.done == fine) walk.offset = rng.uniform();
@@ -57,13 +57,13 @@ struct TelescopingDifference {
     return true;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData& ray, const Flight&, const Value& extinction, auto&) const {
     const bool to_first = ray.correlated ? std::fmod(walk.done, 2) == 0 : walk.done < ray.steps;
     (to_first ? walk.first : walk.second) += extinction;
     ++walk.done;
   }
 
-  Value result(const Walk& walk, const Ray& ray) const {
+  Value result(const Walk& walk, const RayData& ray) const {
     Value difference = ray.value(0);
     const Real coarse = ray.length() / (ray.steps / 2), fine = ray.length() / ray.steps;
     for (int c = 0; c < ray.channels; ++c) {

@@ -42,13 +42,13 @@ struct UnbiasedRayMarching {
                  "optical thickness that sets the length of a march: the majorant's, or that less the minorant's");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Real steps = 0, step = 0;  ///< M and h; M = 0 where there is nothing to look up
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     Real thickness = ray.majorant.total_depth();
     ray.steps = ray.step = 0;
     if (!(thickness > 0)) return;
@@ -68,7 +68,7 @@ struct UnbiasedRayMarching {
     int order = 0, complete = 0, ends = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const {
     walk.sum = walk.trend = ray.value(0);
     walk.done = 0;
     walk.order = walk.complete = walk.ends = 0;
@@ -76,7 +76,7 @@ struct UnbiasedRayMarching {
       for (walk.order = 2; walk.order < kMostOrder && rng.uniform() * (walk.order + 1) < 2;) ++walk.order;
   }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (!(ray.steps > 0) || walk.complete > walk.order) return false;
     if (endpoint_matching && walk.ends < 2) {
       flight.jump(walk.ends == 0 ? ray.begin : ray.end);
@@ -87,7 +87,7 @@ struct UnbiasedRayMarching {
     return true;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData& ray, const Flight&, const Value& extinction, auto&) const {
     if (endpoint_matching && walk.ends < 2) {
       walk.trend = extinction - walk.trend;
       ++walk.ends;
@@ -100,7 +100,7 @@ struct UnbiasedRayMarching {
     walk.done = 0;
   }
 
-  Value result(const Walk& walk, const Ray& ray) const {
+  Value result(const Walk& walk, const RayData& ray) const {
     if (!(ray.steps > 0)) return ray.value(1);
     // So long a series comes up once in 10^27 samples; cut short it would be wrong, so that it counts as an error.
     if (walk.order == kMostOrder) return ray.value(std::numeric_limits<Real>::quiet_NaN());
@@ -110,7 +110,7 @@ struct UnbiasedRayMarching {
   }
 
   /// The variance is that of the series over the comb's own law.  Nothing where that takes too many lookups, or orders.
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     if (!(ray.steps > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     const Real ends = endpoint_matching ? 2 : 0;
     return {.variance = unbiased_march_variance(profile, c, ray.steps, endpoint_matching),

@@ -8,7 +8,7 @@ namespace nullmark {
 /// tentative collision.  With a = 1 - mu/mub and k(y) = exp(-int_0^y (2 mu - mu^2/mub)), E[X^2] = g(0) + int_0^d mub a^2 k g dy;
 /// `second(majorant depth left, optical depth left)` is g, what a vertex of weight 1 adds.
 template <class Value>
-Real vertex_sum_variance(const Passage<Value>& ray, const RayProfile& profile, int c, const auto& second) {
+Real vertex_sum_variance(const MediumRay<Value>& ray, const RayProfile& profile, int c, const auto& second) {
   const Real tau = profile.optical_depth(c), total = ray.majorant.total_depth();
   const auto rate = [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); };
   const auto lost = profile.running(c, [&](const RayProfile::Node& at) {

@@ -41,18 +41,18 @@ struct WeightedDecompositionTracking {
       throw ParameterError("controls", "control \"given\" takes its extinctions from controls, the others take none");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   SampleRange range() const { return control == "minimum" ? kRange : SampleRange::any_sign; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Rates control, rate;
     Control<Value> constant;  ///< the control and its deviation as they are prepared; kept, or every ray would allocate them
     Rates deviation;
   };
 
   /// The majorant is the rate; where it does not exceed the control, mu_c + max |mu - mu_c| is.
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ControlChoice choice;
     choice.kind = control;
     choice.value = std::accumulate(controls.begin(), controls.end(), Real{0});
@@ -72,12 +72,12 @@ struct WeightedDecompositionTracking {
     bool done = false, looked_up = false;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto&) const {
     walk = {1, false, false};
     flight.start(ray.rate);
   }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (walk.done || !flight.next(rng)) return false;
     const Real mu_c = ray.control.rate(flight.piece());
     if (rng.uniform() * flight.rate() >= mu_c && flight.rate() > mu_c) return true;
@@ -85,7 +85,7 @@ struct WeightedDecompositionTracking {
     return false;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     const Parts part(channel(extinction, 0), ray.control.rate(at.piece()), at.rate());
     const bool real = rng.uniform() * part.sum < std::abs(part.residual);
     const Real grown = part.sum / (at.rate() - ray.control.rate(at.piece()));
@@ -93,17 +93,17 @@ struct WeightedDecompositionTracking {
     walk.done = walk.looked_up = real;
   }
 
-  Value result(const Walk& walk, const Ray& ray) const { return ray.value(walk.done ? 0 : walk.weight); }
+  Value result(const Walk& walk, const RayData& ray) const { return ray.value(walk.done ? 0 : walk.weight); }
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray, const Flight& at) const {
+  Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
     return {walk.done ? EventKind::collision : EventKind::escape, at.position(), ray.value(walk.weight)};
   }
 
-  int real_collisions(const Walk& walk, const Ray&) const { return walk.looked_up; }
+  int real_collisions(const Walk& walk, const RayData&) const { return walk.looked_up; }
 
-  Theory theory(const Ray& ray, const RayProfile& smooth, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.rate, {&ray.rate, &ray.control});
     std::vector<Real> growth, rate, through, death;
     for (const RayProfile::Node& at : profile.nodes(c)) {
@@ -119,7 +119,7 @@ struct WeightedDecompositionTracking {
   }
 
   /// E[w^2; collision] = int [mu_c + |mu - mu_c| A/(mub - mu_c)] K dx.
-  Theory weight_theory(const Ray& ray, const RayProfile& smooth, int c) const {
+  Theory weight_theory(const RayData& ray, const RayProfile& smooth, int c) const {
     const RayProfile profile = cut_at_levels(smooth, ray.rate, {&ray.rate, &ray.control});
     std::vector<Real> growth, collisions;
     for (const RayProfile::Node& at : profile.nodes(c)) {

@@ -19,7 +19,7 @@ struct WeightedDeltaTracking {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kLanes = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     Value weight, collision;  ///< of each channel's walk so far, and of its collision
@@ -44,14 +44,14 @@ struct WeightedDeltaTracking {
   /// Channels that share a walk end apart.
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Passage<Value>&, const Flight& at) const {
+  Event<Value> event(const Walk& walk, const MediumRay<Value>&, const Flight& at) const {
     if (!walk.done) return {EventKind::escape, at.position(), walk.weight};
     return {EventKind::collision, at.position(), walk.collision};
   }
 
   auto real_collisions(const Walk& walk, const auto&) const { return walk.done; }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& smooth, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
     const auto rate = [&](const RayProfile::Node& at) { return ray.majorant.rate(at.piece); };
     const auto killed = [&](int, const RayProfile::Node& at) {
@@ -70,7 +70,7 @@ struct WeightedDeltaTracking {
   }
 
   /// E[w^2; collision] = int mu (mu + |mu_n|)/mub K dx.
-  Theory weight_theory(const Passage<Value>& ray, const RayProfile& smooth, int c) const {
+  Theory weight_theory(const MediumRay<Value>& ray, const RayProfile& smooth, int c) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
     std::vector<Real> growth, collisions;
     for (const RayProfile::Node& at : profile.nodes(c)) {

@@ -17,10 +17,10 @@ struct PlantedBinShape : DeltaTracking<Value> {
   static constexpr Real kBins = 8;
 
   using Base = DeltaTracking<Value>;
-  using Ray = typename Base::Ray;
+  using RayData = typename Base::RayData;
   using Walk = typename Base::Walk;
 
-  Event<Value> event(const Walk& walk, const Ray& ray, const Flight& at) const {
+  Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
     Event<Value> event = Base::event(walk, ray, at);
     const Real mu = ray.medium.maximum[0], share = -std::expm1(-mu * ray.length());
     if (event.kind == EventKind::escape || !(share > 0)) return event;
@@ -29,7 +29,7 @@ struct PlantedBinShape : DeltaTracking<Value> {
     return event;
   }
 
-  void theory() const = delete;
+  static constexpr bool theory = false;
 };
 
 }  // namespace nullmark

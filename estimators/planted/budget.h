@@ -27,13 +27,13 @@ struct PlantedBudget : RatioTracking<Value> {
     int walks = 0, lookups = 0;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
     walk.sum = ray.value(0);
     walk.walks = walk.lookups = 0;
   }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     while (!flight.next(rng)) {
       walk.sum += walk.weight;
       ++walk.walks;
@@ -45,10 +45,10 @@ struct PlantedBudget : RatioTracking<Value> {
     return true;
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.sum / static_cast<Real>(walk.walks); }
+  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.sum / static_cast<Real>(walk.walks); }
 
   /// Nothing is claimed of the average's variance and cost.
-  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const { return {}; }
+  Theory theory(const MediumRay<Value>&, const RayProfile&, int, Quantity) const { return {}; }
 };
 
 }  // namespace nullmark

@@ -13,11 +13,11 @@ struct PlantedChannelMajorant : RatioTracking<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Rates first;
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.first.start(ray.begin);
     for (const Segment& segment : ray.bounds.segments) {
       const Real most = segment.extinction.maximum.maxCoeff();
@@ -27,12 +27,12 @@ struct PlantedChannelMajorant : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
     flight.start(ray.first);
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto&) const {
     const Real mub = ray.majorant.rate(at.piece());
     walk.weight *= (mub - extinction) / mub;
   }
@@ -48,7 +48,7 @@ struct PlantedChannelSwap : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const {
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
     Value rotated = walk.weight;
     for (int c = 0; c < ray.channels; ++c) channel(rotated, c) = channel(walk.weight, (c + 1) % ray.channels);
     return rotated;

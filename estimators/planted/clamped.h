@@ -22,7 +22,7 @@ struct PlantedClampedRatio : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return clamped_to_unit(walk.weight); }
+  Value result(const Walk& walk, const MediumRay<Value>&) const { return clamped_to_unit(walk.weight); }
 };
 
 /// Residual ratio tracking clamped to [0,1]: samples above 1 are what balances those below the mean.
@@ -36,10 +36,10 @@ struct PlantedClampedResidual : ResidualRatioTracking<Value> {
 
   SampleRange range() const { return kRange; }
 
-  using Ray = typename ResidualRatioTracking<Value>::Ray;
+  using RayData = typename ResidualRatioTracking<Value>::RayData;
   using Walk = typename ResidualRatioTracking<Value>::Walk;
 
-  Value result(const Walk& walk, const Ray& ray) const {
+  Value result(const Walk& walk, const RayData& ray) const {
     return clamped_to_unit(ResidualRatioTracking<Value>::result(walk, ray));
   }
 };
@@ -55,7 +55,7 @@ struct PlantedCappedExtinction : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     Value capped = extinction;
     for (int c = 0; c < ray.channels; ++c) channel(capped, c) = std::min(channel(extinction, c), at.rate());
     RatioTracking<Value>::consume(walk, ray, at, capped, rng);

@@ -15,7 +15,7 @@ struct PlantedZero : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  Value result(const Walk&, const Passage<Value>& ray) const { return ray.value(0); }
+  Value result(const Walk&, const MediumRay<Value>& ray) const { return ray.value(0); }
 };
 
 /// Always T, without a lookup: a reference that leaked into the estimator.  No test of the mean can object; lookups and variance
@@ -30,8 +30,8 @@ struct PlantedReference : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  bool propose(Walk&, const Passage<Value>&, Flight&, auto&) const { return false; }
-  Value result(const Walk&, const Passage<Value>& ray) const { return exponential(Value(-*ray.exact_depth)); }
+  bool propose(Walk&, const MediumRay<Value>&, Flight&, auto&) const { return false; }
+  Value result(const Walk&, const MediumRay<Value>& ray) const { return exponential(Value(-*ray.exact_depth)); }
 };
 
 }  // namespace nullmark

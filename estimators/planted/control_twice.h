@@ -12,10 +12,10 @@ struct PlantedControlTwice : ResidualRatioTracking<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  using Ray = typename ResidualRatioTracking<Value>::Ray;
+  using RayData = typename ResidualRatioTracking<Value>::RayData;
   using Walk = typename ResidualRatioTracking<Value>::Walk;
 
-  Value result(const Walk& walk, const Ray& ray) const {
+  Value result(const Walk& walk, const RayData& ray) const {
     return ResidualRatioTracking<Value>::result(walk, ray) * exponential(Value(-ray.control.depth));
   }
 };

@@ -15,10 +15,10 @@ struct PlantedSharedOffset : UnbiasedRayMarching<Value> {
   static constexpr const char* kCaughtBy = "mean";
 
   using Base = UnbiasedRayMarching<Value>;
-  using Ray = typename Base::Ray;
+  using RayData = typename Base::RayData;
   using Walk = typename Base::Walk;
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     const Real before = walk.offset;
     if (!Base::propose(walk, ray, flight, rng)) return false;
     if (walk.complete > 0) {
@@ -29,7 +29,7 @@ struct PlantedSharedOffset : UnbiasedRayMarching<Value> {
   }
 
   /// Right at first order only.
-  Theory theory(const Ray&, const RayProfile&, int, Quantity) const { return {}; }
+  Theory theory(const RayData&, const RayProfile&, int, Quantity) const { return {}; }
 };
 
 /// A telescoping march that divides its difference by (1 - r)^n, not by p(n) = r (1 - r)^n.
@@ -43,12 +43,12 @@ struct PlantedUnweightedLevel : Telescoping<Value> {
   using Base = Telescoping<Value>;
   using Walk = typename Base::Walk;
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     Base::init(walk, ray, flight, rng);
     walk.probability /= this->r;
   }
 
-  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const { return {}; }
+  Theory theory(const MediumRay<Value>&, const RayProfile&, int, Quantity) const { return {}; }
 };
 
 /// Majorant-guided ratio tracking that leaves the last flight's weight e^{(q - 1)(M - s)} out.
@@ -62,14 +62,14 @@ struct PlantedGuidedEscape : MajorantGuidedRatio<Value> {
   using Base = MajorantGuidedRatio<Value>;
   using Walk = typename Base::Walk;
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     const Value before = walk.weight;
     if (Base::propose(walk, ray, flight, rng)) return true;
     walk.weight = before;
     return false;
   }
 
-  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const { return {}; }
+  Theory theory(const MediumRay<Value>&, const RayProfile&, int, Quantity) const { return {}; }
 };
 
 }  // namespace nullmark

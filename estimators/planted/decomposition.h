@@ -15,7 +15,7 @@ struct PlantedDecompositionStart : AnalogDecompositionTracking<Value> {
   static constexpr const char* kCaughtBy = "mean";
 
   using Base = AnalogDecompositionTracking<Value>;
-  using Ray = typename Base::Ray;
+  using RayData = typename Base::RayData;
 
   void check(const Extrema&) const {}
 
@@ -23,14 +23,14 @@ struct PlantedDecompositionStart : AnalogDecompositionTracking<Value> {
     Real collision = 0;
   };
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (!Base::propose(walk, ray, flight, rng)) return false;
     walk.collision = flight.position();
     flight.jump(ray.begin);
     return true;
   }
 
-  Event<Value> event(const Walk& walk, const Ray& ray, const Flight& at) const {
+  Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
     Event<Value> event = Base::event(walk, ray, at);
     if (walk.looked_up) event.distance = walk.collision;
     return event;
@@ -47,7 +47,7 @@ struct PlantedStaleResidual : WeightedDecompositionTracking<Value> {
   static constexpr const char* kCaughtBy = "mean";
 
   using Base = WeightedDecompositionTracking<Value>;
-  using Ray = typename Base::Ray;
+  using RayData = typename Base::RayData;
 
   void check(const Extrema&) const {}
 
@@ -56,12 +56,12 @@ struct PlantedStaleResidual : WeightedDecompositionTracking<Value> {
     bool known = false;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     Base::init(walk, ray, flight, rng);
     walk.known = false;
   }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     while (Base::propose(walk, ray, flight, rng)) {
       if (!walk.known) return true;
       Base::consume(walk, ray, flight, walk.first, rng);
@@ -69,7 +69,7 @@ struct PlantedStaleResidual : WeightedDecompositionTracking<Value> {
     return false;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     walk.first = extinction;
     walk.known = true;
     Base::consume(walk, ray, at, extinction, rng);
@@ -87,12 +87,12 @@ struct PlantedDecompositionMarginal : WeightedDecompositionTracking<Value> {
   static constexpr const char* kCaughtBy = "mean";
 
   using Base = WeightedDecompositionTracking<Value>;
-  using Ray = typename Base::Ray;
+  using RayData = typename Base::RayData;
   using Walk = typename Base::Walk;
 
   void check(const Extrema&) const {}
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     Base::consume(walk, ray, at, extinction, rng);
     walk.weight *= 1 - ray.control.rate(at.piece()) / at.rate();
   }

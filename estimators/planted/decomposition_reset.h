@@ -18,14 +18,14 @@ struct PlantedDecompositionReset {
   static constexpr bool kNeedsBound = true;
   static constexpr const char* kCaughtBy = "mean";
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Real control = 0;
     Rates residual;
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.control = ray.medium.minimum.minCoeff();
     ray.residual.start(ray.begin);
     for (const Segment& segment : ray.bounds.segments)
@@ -39,11 +39,11 @@ struct PlantedDecompositionReset {
     Real distance = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const {
     walk = {ray.value(1), ray.begin + rng.exponential() / ray.control, false, ray.end};
   }
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (walk.done) return false;
     flight.start(ray.residual);
     const bool inside = flight.next(rng);
@@ -53,7 +53,7 @@ struct PlantedDecompositionReset {
     return false;
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     const Real threshold = rng.uniform() * at.rate();
     bool any = false;
     for (int c = 0; c < ray.channels; ++c) {
@@ -64,17 +64,17 @@ struct PlantedDecompositionReset {
     if (walk.done) walk.distance = at.position();
   }
 
-  Value result(const Walk& walk, const Ray&) const { return walk.transmittance; }
+  Value result(const Walk& walk, const RayData&) const { return walk.transmittance; }
 
   bool samples_events(int channels) const { return channels == 1; }
 
-  Event<Value> event(const Walk& walk, const Ray& ray, const Flight&) const {
+  Event<Value> event(const Walk& walk, const RayData& ray, const Flight&) const {
     return {walk.distance < ray.end ? EventKind::collision : EventKind::escape, walk.distance, ray.value(1)};
   }
 
-  int real_collisions(const Walk& walk, const Ray&) const { return walk.done; }
+  int real_collisions(const Walk& walk, const RayData&) const { return walk.done; }
 
-  Theory theory(const Ray& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     const Real depth = profile.optical_depth(c);
     Theory theory{.variance = std::exp(-depth) * -std::expm1(-depth)};
     state_lookups_until_killed(

@@ -16,7 +16,7 @@ struct PlantedFlightRate : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  bool propose(Walk&, const Passage<Value>&, Flight& flight, auto& rng) const {
+  bool propose(Walk&, const MediumRay<Value>&, Flight& flight, auto& rng) const {
     return flight.advance_to(flight.depth() + rng.exponential() / kRateKept);
   }
 };

@@ -17,18 +17,18 @@ struct PlantedHalfDepth : RatioTracking<Value> {
   using Base = RatioTracking<Value>;
   using Walk = typename Base::Walk;
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const {
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
     return (walk.weight + exponential(Value(-*ray.exact_depth))) / 2;
   }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity quantity) const {
     Theory theory = Base::theory(ray, profile, c, quantity);
     *theory.variance /= 4;
     return theory;
   }
 
   /// Samples are no products.
-  void count_law() const = delete;
+  static constexpr bool count_law = false;
 };
 
 }  // namespace nullmark

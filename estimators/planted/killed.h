@@ -23,23 +23,23 @@ struct PlantedKilled : RatioTracking<Value> {
     int collisions = 0;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     Base::init(walk, ray, flight, rng);
     walk.collisions = 0;
   }
 
-  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const {
     return walk.collisions <= most && flight.next(rng);
   }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     Base::consume(walk, ray, at, extinction, rng);
     if (++walk.collisions > most) walk.weight = ray.value(0);
   }
 
   /// Neither variance nor lookups are those of ratio tracking.
-  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const { return {}; }
-  void count_law() const = delete;
+  Theory theory(const MediumRay<Value>&, const RayProfile&, int, Quantity) const { return {}; }
+  static constexpr bool count_law = false;
 };
 
 }  // namespace nullmark

@@ -24,13 +24,13 @@ struct PlantedLearnedBound {
 
   std::shared_ptr<std::atomic<int>> learned = std::make_shared<std::atomic<int>>(0);
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     std::array<Rates, kGuesses> guesses;
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     for (int i = 0; i < kGuesses; ++i) {
       Rates& rates = ray.guesses[static_cast<std::size_t>(i)];
       rates.start(ray.begin, ray.bounds.crossing);
@@ -44,20 +44,20 @@ struct PlantedLearnedBound {
     int guess = 0;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto&) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto&) const {
     walk = {ray.value(1), *learned};
     flight.start(ray.guesses[static_cast<std::size_t>(walk.guess)]);
   }
 
-  bool propose(Walk&, const Ray&, Flight& flight, auto& rng) const { return flight.next(rng); }
+  bool propose(Walk&, const RayData&, Flight& flight, auto& rng) const { return flight.next(rng); }
 
-  void consume(Walk& walk, const Ray&, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData&, const Flight& at, const Value& extinction, auto&) const {
     walk.weight *= (at.rate() - extinction) / at.rate();
     int known = walk.guess;
     if (largest(extinction) > at.rate() && known + 1 < kGuesses) learned->compare_exchange_strong(known, known + 1);
   }
 
-  Value result(const Walk& walk, const Ray&) const { return walk.weight; }
+  Value result(const Walk& walk, const RayData&) const { return walk.weight; }
 };
 
 }  // namespace nullmark

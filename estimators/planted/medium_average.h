@@ -17,18 +17,20 @@ struct PlantedMediumAverage : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
     const Value average = load<Value>(ray.medium.average.data(), ray.channels);
     walk.weight *= (at.rate() - (extinction - average)) / at.rate();
   }
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const { return walk.weight * exponential(Value(-*ray.exact_depth)); }
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
+    return walk.weight * exponential(Value(-*ray.exact_depth));
+  }
 
   /// Lookups alone are those of ratio tracking.
-  Theory theory(const Passage<Value>& ray, const RayProfile&, int, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile&, int, Quantity) const {
     return {.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
   }
-  void count_law() const = delete;
+  static constexpr bool count_law = false;
 };
 
 }  // namespace nullmark

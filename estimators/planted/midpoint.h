@@ -19,7 +19,7 @@ struct PlantedMidpoint {
   static constexpr int kSteps = 4;
   static constexpr Real kJitter = 1e-5;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     Value sum;
@@ -27,20 +27,22 @@ struct PlantedMidpoint {
     int done = 0;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto& rng) const {
     walk = {ray.value(0), 0.5 + kJitter * (rng.uniform() - 0.5), 0};
   }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto&) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto&) const {
     if (!(ray.length() > 0) || walk.done == kSteps) return false;
     flight.jump(ray.begin + (walk.done + walk.offset) * ray.length() / kSteps);
     ++walk.done;
     return true;
   }
 
-  void consume(Walk& walk, const Passage<Value>&, const Flight&, const Value& extinction, auto&) const { walk.sum += extinction; }
+  void consume(Walk& walk, const MediumRay<Value>&, const Flight&, const Value& extinction, auto&) const {
+    walk.sum += extinction;
+  }
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const {
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
     return exponential(Value(-walk.sum * (ray.length() / kSteps)));
   }
 };

@@ -24,7 +24,7 @@ struct PlantedLostWalks : BidirectionalMis<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  Value result(const typename BidirectionalMis<Value>::Walk& walk, const Passage<Value>& ray) const {
+  Value result(const typename BidirectionalMis<Value>::Walk& walk, const MediumRay<Value>& ray) const {
     const auto alone = [](const auto& prefix) { return Value(prefix.weight.back() / (2 + prefix.all_gaps)); };
     return BidirectionalMis<Value>::result(walk, ray) - alone(walk.forwards) - alone(walk.backwards);
   }

@@ -18,12 +18,12 @@ struct PlantedCoin : RatioTracking<Value> {
     Real coin = 0;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
     walk.coin = rng.uniform();
   }
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const {
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
     Value x = ray.value(0);
     for (int c = 0; c < ray.channels; ++c) channel(x, c) = walk.coin < channel(walk.weight, c) ? 1 : 0;
     return x;
@@ -42,14 +42,14 @@ struct PlantedSecondLookup : RatioTracking<Value> {
     bool again = false;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
     walk.again = false;
   }
 
-  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const { return walk.again || flight.next(rng); }
+  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const { return walk.again || flight.next(rng); }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     if (!walk.again) RatioTracking<Value>::consume(walk, ray, at, extinction, rng);
     walk.again = !walk.again;
   }

@@ -10,9 +10,9 @@ class NeighbourRay final : public WrappedKernel {
  public:
   NeighbourRay(std::unique_ptr<const Kernel> inner, const Vec3& shift) : WrappedKernel(std::move(inner)), shift_(shift) {}
 
-  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+  void sample(Workspace& workspace, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
-    RayContext moved = context;
+    PreparedRay moved = context;
     moved.local.origin += medium.world_to_local().linear() * shift_;
     const bool stays =
         inside(medium.bounds(), moved.local.at(moved.local.begin)) && inside(medium.bounds(), moved.local.at(moved.local.end));

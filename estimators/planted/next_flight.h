@@ -13,9 +13,9 @@ struct PlantedStepParenthesis : PublishedNextFlightRatioTracking<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity quantity) const {
     return NextFlightRatioTracking<Value>::theory(ray, profile, c, quantity);
   }
 };
@@ -30,7 +30,7 @@ struct PlantedWholeDepth : NextFlightRatioTracking<Value> {
 
   using Walk = typename NextFlightRatioTracking<Value>::Walk;
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
     walk.weight *= (at.rate() - extinction) / at.rate();
     walk.sum += walk.weight * std::exp(-ray.majorant.total_depth());
   }
@@ -45,12 +45,12 @@ struct PlantedTerminalTerm : NextFlightDeltaTracking<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  using Ray = typename NextFlightDeltaTracking<Value>::Ray;
+  using RayData = typename NextFlightDeltaTracking<Value>::RayData;
   using Walk = typename NextFlightDeltaTracking<Value>::Walk;
 
   void parameters(ParameterVisitor&) {}
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     const Real escape = std::exp(-at.depth_left()), threshold = rng.uniform() * at.rate();
     bool any = false;
     for (int c = 0; c < ray.channels; ++c) {

@@ -12,9 +12,9 @@ struct PlantedStrictTail : PowerSeriesNextFlight<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  using Ray = typename PowerSeriesNextFlight<Value>::Ray;
+  using RayData = typename PowerSeriesNextFlight<Value>::RayData;
 
-  void consume(typename PowerSeriesNextFlight<Value>::Walk& walk, const Ray& ray, const Flight& at, const Value& extinction,
+  void consume(typename PowerSeriesNextFlight<Value>::Walk& walk, const RayData& ray, const Flight& at, const Value& extinction,
                auto&) const {
     walk.series.multiply(ray.majorant.total_depth() / static_cast<Real>(walk.lookups) * null_ratio(at, extinction));
     walk.series.add(ray.tail.at_least(walk.lookups + 1));

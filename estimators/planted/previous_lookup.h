@@ -15,18 +15,18 @@ struct PlantedPreviousExtinction : DeltaTracking<Value> {
   static constexpr const char* kCaughtBy = "mean";
 
   using Base = DeltaTracking<Value>;
-  using Ray = typename Base::Ray;
+  using RayData = typename Base::RayData;
 
   struct Walk : Base::Walk {
     Value previous;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     Base::init(walk, ray, flight, rng);
     walk.previous = ray.value(0);
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     Base::consume(walk, ray, at, walk.previous, rng);
     walk.previous = extinction;
   }
@@ -45,12 +45,12 @@ struct PlantedPathStart : RatioTracking<Value> {
     Real collision = 0;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
     walk.collision = ray.begin;
   }
 
-  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const {
     const Real start = walk.collision;
     if (!flight.next(rng)) return false;
     walk.collision = flight.position();

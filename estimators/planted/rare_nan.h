@@ -23,7 +23,7 @@ struct PlantedNan : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto& rng) const {
     const Real first = 1 - rng.peek();
     walk.weight = ray.value(first < chance ? std::numeric_limits<Real>::quiet_NaN() : 1);
   }

@@ -24,14 +24,14 @@ struct PlantedRoulette : RatioTracking<Value> {
     bool done = false;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
     walk.done = false;
   }
 
-  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
+  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     RatioTracking<Value>::consume(walk, ray, at, extinction, rng);
     if (largest(walk.weight) < threshold && rng.uniform() >= survival) {
       walk.weight = ray.value(0);
@@ -40,7 +40,7 @@ struct PlantedRoulette : RatioTracking<Value> {
   }
 
   /// Roulette changes variance and lookups, so ratio tracking's are not claimed.
-  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const { return {}; }
+  Theory theory(const MediumRay<Value>&, const RayProfile&, int, Quantity) const { return {}; }
 };
 
 }  // namespace nullmark

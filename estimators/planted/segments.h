@@ -16,7 +16,7 @@ struct PlantedLastSegment : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  bool propose(Walk&, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk&, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     return flight.next(rng) && flight.piece() + 1 < ray.majorant.size();
   }
 };
@@ -31,7 +31,7 @@ struct PlantedFirstSegment : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  bool propose(Walk&, const Passage<Value>&, Flight& flight, auto& rng) const {
+  bool propose(Walk&, const MediumRay<Value>&, Flight& flight, auto& rng) const {
     while (flight.next(rng))
       if (flight.piece() > 0) return true;
     return false;
@@ -48,10 +48,10 @@ struct PlantedEarlySurface : DeltaTracking<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  using Ray = typename DeltaTracking<Value>::Ray;
+  using RayData = typename DeltaTracking<Value>::RayData;
   using Walk = typename DeltaTracking<Value>::Walk;
 
-  bool propose(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     while (!this->done(walk) && flight.piece() < ray.majorant.size()) {
       const std::size_t cell = flight.piece();
       const Real exponential = rng.exponential();
@@ -78,12 +78,12 @@ struct PlantedNoRewind : RatioTracking<Value> {
     std::size_t cell = 0;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
     walk.cell = 0;
   }
 
-  bool propose(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     for (; walk.cell < ray.majorant.size(); ++walk.cell) {
       const Real depth = flight.depth() + rng.exponential();
       if (depth < ray.majorant.depth_after(walk.cell)) return flight.advance_to(depth);
@@ -103,7 +103,7 @@ struct PlantedCarriedDistance : RatioTracking<Value> {
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  bool propose(Walk&, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  bool propose(Walk&, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     const Rates& rates = ray.majorant;
     if (rates.size() == 0) return false;
     const Real position = flight.position() + rng.exponential() / flight.rate();

@@ -18,15 +18,15 @@ struct PlantedSlight : RatioTracking<Value> {
   using Base = RatioTracking<Value>;
   using Walk = typename Base::Walk;
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight * kFactor; }
+  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.weight * kFactor; }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity quantity) const {
     Theory theory = Base::theory(ray, profile, c, quantity);
     *theory.variance *= kFactor * kFactor;
     return theory;
   }
 
-  CountLaw count_law(const Passage<Value>& ray, const RayProfile& profile, int c) const {
+  CountLaw count_law(const MediumRay<Value>& ray, const RayProfile& profile, int c) const {
     CountLaw law = Base::count_law(ray, profile, c);
     law.factor = kFactor;
     return law;

@@ -15,10 +15,10 @@ struct PlantedSpectralSum : SpectralTracking<Value> {
   static constexpr const char* kCaughtBy = "mean";
 
   using Base = SpectralTracking<Value>;
-  using Ray = typename Base::Ray;
+  using RayData = typename Base::RayData;
   using Walk = typename Base::Walk;
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     const Coefficients<Value> mu(extinction, ray.albedo, at.rate());
     const Real u = rng.uniform() * at.rate(), absorb = largest(mu.absorb), scatter = largest(mu.scatter);
     const EventKind kind = u < absorb ? EventKind::absorb : u < absorb + scatter ? EventKind::scatter : EventKind::escape;
@@ -40,7 +40,7 @@ struct PlantedHeroHistory : HeroWavelengthTracking<Value> {
   using Base = HeroWavelengthTracking<Value>;
   using Walk = typename Base::Walk;
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     walk.chance = ray.value(1);
     Base::consume(walk, ray, at, extinction, rng);
   }

@@ -21,12 +21,12 @@ struct PlantedVariance : RatioTracking<Value> {
     visit.number("factor", factor, Range::positive(), "", "stated variance over the one that it has");
   }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity quantity) const {
     Theory theory = Base::theory(ray, profile, c, quantity);
     *theory.variance *= factor;
     return theory;
   }
-  void count_law() const = delete;
+  static constexpr bool count_law = false;
 };
 
 /// T but for a small error, with the guarantee that every sample is exact.  Makes no lookup, as it states.
@@ -47,15 +47,15 @@ struct PlantedExact {
     visit.number("error", error, Range::non_negative(), "", "of every sample, relative");
   }
 
-  Claim claim(Quantity) const { return Claim::exact; }
+  Guarantee claim(Quantity) const { return Guarantee::exact; }
 
   struct Walk {};
-  void init(Walk&, const Passage<Value>&, Flight&, auto&) const {}
-  bool propose(Walk&, const Passage<Value>&, Flight&, auto&) const { return false; }
-  void consume(Walk&, const Passage<Value>&, const Flight&, const Value&, auto&) const {}
-  Value result(const Walk&, const Passage<Value>& ray) const { return exponential(Value(-*ray.exact_depth)) * (1 + error); }
+  void init(Walk&, const MediumRay<Value>&, Flight&, auto&) const {}
+  bool propose(Walk&, const MediumRay<Value>&, Flight&, auto&) const { return false; }
+  void consume(Walk&, const MediumRay<Value>&, const Flight&, const Value&, auto&) const {}
+  Value result(const Walk&, const MediumRay<Value>& ray) const { return exponential(Value(-*ray.exact_depth)) * (1 + error); }
 
-  Theory theory(const Passage<Value>&, const RayProfile&, int, Quantity) const { return {.lookups = 0}; }
+  Theory theory(const MediumRay<Value>&, const RayProfile&, int, Quantity) const { return {.lookups = 0}; }
 };
 
 }  // namespace nullmark

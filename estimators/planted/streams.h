@@ -10,7 +10,7 @@ class PairedStreams final : public WrappedKernel {
  public:
   using WrappedKernel::WrappedKernel;
 
-  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+  void sample(Workspace& workspace, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
     out.values.clear();
     out.lookups.clear();
@@ -42,9 +42,9 @@ class OneRaysStreams final : public WrappedKernel {
  public:
   using WrappedKernel::WrappedKernel;
 
-  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+  void sample(Workspace& workspace, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
-    RayContext renumbered = context;
+    PreparedRay renumbered = context;
     renumbered.index = 0;
     WrappedKernel::sample(workspace, medium, renumbered, key, first, count, quantity, out, counters);
   }
@@ -69,7 +69,7 @@ class CallStreams final : public WrappedKernel {
  public:
   using WrappedKernel::WrappedKernel;
 
-  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t,
+  void sample(Workspace& workspace, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
     WrappedKernel::sample(workspace, medium, context, key, 0, count, quantity, out, counters);
   }

@@ -13,23 +13,23 @@ struct PlantedUnitLength : RatioTracking<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Rates flown;
   };
 
-  void prepare(Ray& ray) const {
+  void prepare(RayData& ray) const {
     ray.flown.start(ray.begin, ray.bounds.crossing);
     for (const Segment& segment : ray.bounds.segments) ray.flown.append(segment.end, segment.majorant / ray.length());
   }
 
   using Walk = typename RatioTracking<Value>::Walk;
 
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
     flight.start(ray.flown);
   }
 
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto&) const {
     const Real mub = ray.majorant.rate(at.piece());
     walk.weight *= (mub - extinction) / mub;
   }

@@ -14,7 +14,7 @@ struct PlantedWeightSign : WeightedDeltaTracking<Value> {
 
   using Walk = typename WeightedDeltaTracking<Value>::Walk;
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     WeightedDeltaTracking<Value>::consume(walk, ray, at, extinction, rng);
     for (int c = 0; c < ray.channels; ++c) channel(walk.weight, c) = std::abs(channel(walk.weight, c));
   }
@@ -34,12 +34,12 @@ struct PlantedCollisionWeight : WeightedDeltaTracking<Value> {
     Real before = 1;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     Base::init(walk, ray, flight, rng);
     walk.before = 1;
   }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     walk.before = channel(walk.weight, 0);
     Base::consume(walk, ray, at, extinction, rng);
     walk.collision = walk.before * channel(extinction, 0) / at.rate();

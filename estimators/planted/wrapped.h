@@ -13,12 +13,12 @@ class WrappedKernel : public Kernel {
   bool needs_knots() const override { return inner_->needs_knots(); }
   bool states_theory() const override { return inner_->states_theory(); }
   bool answers(Quantity quantity) const override { return inner_->answers(quantity); }
-  std::size_t outputs(Quantity quantity, const RayContext& context) const override { return inner_->outputs(quantity, context); }
+  std::size_t outputs(Quantity quantity, const PreparedRay& context) const override { return inner_->outputs(quantity, context); }
   std::unique_ptr<Workspace> workspace() const override { return inner_->workspace(); }
-  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const RayContext& context) const override {
+  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const PreparedRay& context) const override {
     inner_->begin_ray(workspace, medium, extrema, context);
   }
-  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+  void sample(Workspace& workspace, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
     inner_->sample(workspace, medium, context, key, first, count, quantity, out, counters);
   }
@@ -46,7 +46,7 @@ class WrappedSource final : public EstimatorSource {
     if constexpr (requires { bug_.parameters(visit); }) bug_.parameters(visit);
     honest_.parameters(visit);
   }
-  Claim claim(Quantity quantity) const override { return honest_.claim(quantity); }
+  Guarantee claim(Quantity quantity) const override { return honest_.claim(quantity); }
   SampleRange range(int channels) const override { return honest_.range(channels); }
   bool needs_bound() const override { return honest_.needs_bound(); }
   std::optional<Real> order(Quantity quantity) const override { return honest_.order(quantity); }

@@ -28,18 +28,18 @@ struct RouletteRatioTracking {
     visit.number("share", share, Range::between(0, 1), "", "power of the null probability left to roulette: 0 ratio, 1 delta");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     Value weight;
     bool done = false;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), false}; }
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), false}; }
 
-  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
+  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     const Value null = (at.rate() - extinction) / at.rate();
     Real most = 0;
     for (int c = 0; c < ray.channels; ++c) most = std::max(most, std::abs(channel(null, c)));
@@ -51,11 +51,11 @@ struct RouletteRatioTracking {
       walk.weight *= null / survival;
   }
 
-  Value result(const Walk& walk, const Passage<Value>&) const { return walk.weight; }
+  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.weight; }
 
-  int real_collisions(const Walk& walk, const Passage<Value>&) const { return walk.done; }
+  int real_collisions(const Walk& walk, const MediumRay<Value>&) const { return walk.done; }
 
-  Theory theory(const Passage<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     const std::vector<RayProfile::Node>& nodes = profile.nodes(c);
     std::vector<Real> killed(nodes.size()), survived(nodes.size());  // mub (1 - p), mub p
     Real lost = 0;                                                   // int mub (1 - a^2/p)

@@ -1,6 +1,7 @@
 #pragma once
 
-#include "estimators/estimator.h"
+#include "estimators/theory/ray_profile.h"
+#include "estimators/theory/theory.h"
 
 namespace nullmark {
 

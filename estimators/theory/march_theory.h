@@ -1,6 +1,8 @@
 #pragma once
 
-#include "estimators/estimator.h"
+#include "estimators/theory/ray_profile.h"
+#include "estimators/theory/theory.h"
+#include "estimators/walk/quantity.h"
 
 namespace nullmark {
 

@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "estimators/estimator.h"
 #include "estimators/theory/ray_profile.h"
+#include "estimators/theory/theory.h"
 
 namespace nullmark {
 

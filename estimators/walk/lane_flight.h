@@ -7,13 +7,13 @@ namespace nullmark {
 
 /// The rates that all walks of a ray fly through, rounded to T.
 template <class T, std::size_t N>
-class LaneCourse {
+class LaneRates {
  public:
   using Pack = Lanes<T, N>;
   using Index = LaneIndex<T, N>;
 
-  LaneCourse() = default;
-  explicit LaneCourse(const Rates& rates)
+  LaneRates() = default;
+  explicit LaneRates(const Rates& rates)
       : pieces_(rates.size() > 0 ? rates.pieces<T>() : &kVacuum),
         last_(rates.size() > 0 ? static_cast<Number>(rates.size()) - 1 : 0),
         begin_(static_cast<T>(rates.begin())),
@@ -52,9 +52,9 @@ struct LanePlace {
   LaneIndex<T, N> piece;
 };
 
-/// Flight for N walks of one ray side by side: the same steps in the same order for every lane.  Without `several` the course has
+/// Flight for N walks of one ray side by side: the same steps in the same order for every lane.  Without `several` the rates has
 /// one piece, as with one bound for the whole ray, and nothing is asked about others; an estimator that sets out on another
-/// course than the ray's does so in its init, which runs with `several`.
+/// rates than the ray's does so in its init, which runs with `several`.
 template <class T, std::size_t N, bool several = true>
 class LaneFlight {
  public:
@@ -62,14 +62,14 @@ class LaneFlight {
   using Mask = LaneMask<T, N>;
   using Index = LaneIndex<T, N>;
   using Streams = LaneRng<T, N>;
-  using Course = LaneCourse<T, N>;
+  using Rates = LaneRates<T, N>;
   using Place = LanePlace<T, N>;
 
-  LaneFlight(Course& course, Place& at) : course_(course), at_(at) {}
+  LaneFlight(Rates& rates, Place& at) : rates_(rates), at_(at) {}
 
-  void start(const Rates& rates) requires several {
-    course_ = Course(rates);
-    at_ = {Pack(0), Pack(course_.begin_), Index(0)};
+  void start(const nullmark::Rates& rates) requires several {
+    rates_ = Rates(rates);
+    at_ = {Pack(0), Pack(rates_.begin_), Index(0)};
   }
 
   [[gnu::always_inline]] Mask next(Streams& rng) { return next(rng, true); }
@@ -78,9 +78,9 @@ class LaneFlight {
   [[gnu::always_inline]] Mask next(Streams& rng, Mask alive) {
     const Pack depth = rng.exponential_beyond(at_.depth);
     rng.forget(!alive);
-    if (several && course_.rewinds_) {
+    if (several && rates_.rewinds_) {
       // By value: what a call could reach would not stay in registers.
-      const Rewound rewound = rewind(course_, at_, depth, rng.state(), rng.alive(), alive);
+      const Rewound rewound = rewind(rates_, at_, depth, rng.state(), rng.alive(), alive);
       at_ = rewound.at;
       rng.go_on(rewound.stream, rewound.draws);
       return rewound.inside;
@@ -90,16 +90,16 @@ class LaneFlight {
 
   /// Moves forwards to points of the given depths; false (and the ray's end) for lanes whose ray is not that deep.
   [[gnu::always_inline]] Mask advance_to(Pack depth, Mask alive = true) {
-    const Mask inside = alive & (depth < Pack(course_.total_));
+    const Mask inside = alive & (depth < Pack(rates_.total_));
     at_.depth = depth;
-    if (several && course_.last_ > 0) {
+    if (several && rates_.last_ > 0) {
       for (;;) {
-        const Mask behind = inside & !(depth < course_.template of<several, &RatePiece<T>::depth_after>(at_.piece));
+        const Mask behind = inside & !(depth < rates_.template of<several, &RatePiece<T>::depth_after>(at_.piece));
         if (none(behind)) break;
         at_.piece = select(behind, at_.piece + Index(1), at_.piece);
       }
     }
-    at_.position = select(inside, position(course_, at_), Pack(course_.end_));
+    at_.position = select(inside, position(rates_, at_), Pack(rates_.end_));
     return inside;
   }
 
@@ -107,10 +107,10 @@ class LaneFlight {
 
   Pack position() const { return at_.position; }
   Index piece() const { return at_.piece; }
-  Pack rate() const { return course_.template rate<several>(at_.piece); }
+  Pack rate() const { return rates_.template rate<several>(at_.piece); }
   Pack depth() const { return at_.depth; }
-  Pack depth_left() const { return Pack(course_.total_) - at_.depth; }
-  Pack total_depth() const { return course_.total_; }
+  Pack depth_left() const { return Pack(rates_.total_) - at_.depth; }
+  Pack total_depth() const { return rates_.total_; }
 
  private:
   struct Rewound {
@@ -120,43 +120,43 @@ class LaneFlight {
     Mask inside;
   };
 
-  [[gnu::always_inline]] static Pack position(const Course& course, const Place& at) {
+  [[gnu::always_inline]] static Pack position(const Rates& rates, const Place& at) {
     using Piece = RatePiece<T>;
-    const Pack begin = course.template of<several, &Piece::begin>(at.piece);
-    const Pack end = course.template of<several, &Piece::end>(at.piece);
+    const Pack begin = rates.template of<several, &Piece::begin>(at.piece);
+    const Pack end = rates.template of<several, &Piece::end>(at.piece);
     Pack within = at.depth;
-    if constexpr (several) within = within - course.template of<several, &Piece::depth_before>(at.piece);
-    return smaller(end, begin + within * course.template of<several, &Piece::inverse_rate>(at.piece));
+    if constexpr (several) within = within - rates.template of<several, &Piece::depth_before>(at.piece);
+    return smaller(end, begin + within * rates.template of<several, &Piece::inverse_rate>(at.piece));
   }
 
   /// See Flight::rewind.
-  [[gnu::noinline]] static Rewound rewind(const Course& course, Place at, Pack depth, typename Streams::State stream, Mask living,
+  [[gnu::noinline]] static Rewound rewind(const Rates& rates, Place at, Pack depth, typename Streams::State stream, Mask living,
                                           Mask flying) {
     Streams rng(stream, living);
-    const Index last(course.last_);
+    const Index last(rates.last_);
     Mask inside = false;
     for (;;) {
-      Pack after = course.template of<several, &RatePiece<T>::depth_after>(at.piece);
+      Pack after = rates.template of<several, &RatePiece<T>::depth_after>(at.piece);
       for (;;) {
         const Mask behind = flying & !(at.depth < after) & (at.piece < last);
         if (none(behind)) break;
         at.piece = select(behind, at.piece + Index(1), at.piece);
-        after = course.template of<several, &RatePiece<T>::depth_after>(at.piece);
+        after = rates.template of<several, &RatePiece<T>::depth_after>(at.piece);
       }
       flying = flying & (at.depth < after);
       const Mask lands = flying & (depth < after);
       at.depth = select(lands, depth, select(flying, after, at.depth));
       inside = inside | lands;
-      flying = flying & !lands & (at.depth < Pack(course.total_));
+      flying = flying & !lands & (at.depth < Pack(rates.total_));
       if (none(flying)) break;
       const Pack drawn = rng.exponential(flying);
       depth = select(flying, at.depth + drawn, depth);
     }
-    at.position = select(inside, position(course, at), Pack(course.end_));
+    at.position = select(inside, position(rates, at), Pack(rates.end_));
     return {at, stream, rng.draws(), inside};
   }
 
-  Course& course_;
+  Rates& rates_;
   Place& at_;
 };
 

@@ -115,8 +115,8 @@ class Selection : public ProgramTest {
  protected:
   void SetUp() override {
     ProgramTest::SetUp();
-    write("c.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
-      {"name":"e","rays":"single","samples_per_ray":2000,"gate":{"epsilon":0.5,"max_samples_per_ray":100000},
+    write("c.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
+      {"name":"e","rays":"single","samples_per_ray":2000,"verdict":{"epsilon":0.5,"max_samples_per_ray":100000},
        "matrix":{"estimator":["ratio","delta"],"medium":["linear",{"type":"linear","end":2}]}}]})");
   }
   Json provenance(const std::string& file) const { return Json::parse(read(file))["provenance"]; }
@@ -181,7 +181,7 @@ TEST_F(Selection, WhatIsNoCountOfCellsIsIgnored) {
 class Nothing : public ProgramTest {
  protected:
   static std::string config(const std::string& gate) {
-    return R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e",
+    return R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e",
       "rays":{"type":"single","from":[5,5,5],"to":[6,6,6]},"samples_per_ray":1000,)" +
            gate + R"("matrix":{"estimator":["ratio","delta"],"medium":"linear"}}]})";
   }
@@ -205,7 +205,7 @@ TEST_F(Nothing, RaysThatMissTheMediumTestNothing) {
 }
 
 TEST_F(Nothing, ADisabledVerdictIsSkippedWithTheReason) {
-  write("d.json", config(R"("gate":{"enabled":false},)"));
+  write("d.json", config(R"("verdict":{"enabled":false},)"));
   ASSERT_EQ(run("run d.json -o r.json"), 0) << read("err");
   EXPECT_EQ(run("check r.json --junit j.xml"), 5) << read("out");
   EXPECT_NE(read("j.xml").find(R"(tests="2" failures="0" errors="0" skipped="2")"), std::string::npos) << read("j.xml");

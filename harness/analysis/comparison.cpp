@@ -27,97 +27,96 @@ std::string measurement_label(const Measurement& measurement) {
   return label;
 }
 
-Contest empty_contest(const CellRecord& record) {
-  Contest contest;
-  contest.quantity = to_string(record.cell.quantity);
-  contest.medium = record.medium.label;
-  contest.majorant = record.majorant.label;
-  contest.rays = record.ray_set.label;
-  contest.light = transport_label(record.cell.transport);
-  contest.measurement = measurement_label(record.cell.measurement);
-  contest.name = fmt::format("{} | {} | {} | {}", contest.quantity, contest.medium, contest.majorant, contest.rays);
-  for (const std::string* part : {&contest.light, &contest.measurement})
-    if (!part->empty()) contest.name += " | " + *part;
-  return contest;
+Comparison empty_comparison(const CellRecord& record) {
+  Comparison comparison;
+  comparison.quantity = to_string(record.cell.quantity);
+  comparison.medium = record.medium.label;
+  comparison.majorant = record.majorant.label;
+  comparison.rays = record.ray_set.label;
+  comparison.light = transport_label(record.cell.transport);
+  comparison.measurement = measurement_label(record.cell.measurement);
+  comparison.name =
+      fmt::format("{} | {} | {} | {}", comparison.quantity, comparison.medium, comparison.majorant, comparison.rays);
+  for (const std::string* part : {&comparison.light, &comparison.measurement})
+    if (!part->empty()) comparison.name += " | " + *part;
+  return comparison;
 }
 
-/// Trackers that stand twice in a contest are told apart by the first of these that differs among them.
-void tell_apart(std::vector<Contender>& contenders, const std::vector<RunRecord>& runs) {
-  std::map<std::string, std::vector<Contender*>> same;
-  for (Contender& contender : contenders) same[contender.label].push_back(&contender);
-  const auto traits = [&](const Contender& contender) {
-    const Cell& cell = contender.record->cell;
+/// Trackers that stand twice in a comparison are told apart by the first of these that differs among them.
+void tell_apart(std::vector<RankedCell>& cells, const std::vector<RunRecord>& runs) {
+  std::map<std::string, std::vector<RankedCell*>> same;
+  for (RankedCell& ranked : cells) same[ranked.label].push_back(&ranked);
+  const auto traits = [&](const RankedCell& ranked) {
+    const Cell& cell = ranked.record->cell;
     return std::array{fmt::format("seed:{}", cell.seed),
                       fmt::format("samples:{}", cell.samples_per_ray),
                       cell.experiment,
                       std::string(cell.own_streams ? "own streams" : "common streams"),
-                      runs[contender.run].name,
-                      fmt::format("file {}", contender.run + 1)};
+                      runs[ranked.run].name,
+                      fmt::format("file {}", ranked.run + 1)};
   };
   for (auto& [label, those] : same) {
     if (those.size() == 1) continue;
     std::set<std::string> labels;
     for (std::size_t trait = 0; labels.size() < those.size() && trait < traits(*those[0]).size(); ++trait) {
       std::set<std::string> values;
-      for (const Contender* contender : those) values.insert(traits(*contender)[trait]);
+      for (const RankedCell* ranked : those) values.insert(traits(*ranked)[trait]);
       if (values.size() == 1) continue;
       labels.clear();
-      for (Contender* contender : those) labels.insert(contender->label += "/" + traits(*contender)[trait]);
+      for (RankedCell* ranked : those) labels.insert(ranked->label += "/" + traits(*ranked)[trait]);
     }
   }
 }
 
 /// Reachable in a known time.
-bool has_time(const Contender& contender) { return contender.seconds[0] && std::isfinite(contender.seconds[0]->value); }
+bool has_time(const RankedCell& ranked) { return ranked.seconds[0] && std::isfinite(ranked.seconds[0]->value); }
 
-bool claims_unbiased(const Contender& contender) {
-  return contender.record->claims == "unbiased" && contender.record->cell.measurement == Measurement{};
+bool claims_unbiased(const RankedCell& ranked) {
+  return ranked.record->claims == "unbiased" && ranked.record->cell.measurement == Measurement{};
 }
 
-void rank(std::vector<Contender>& contenders) {
-  const auto key = [](const Contender& contender) { return has_time(contender) ? contender.seconds[0]->value : kInfinity; };
-  std::stable_sort(contenders.begin(), contenders.end(), [&](const Contender& a, const Contender& b) { return key(a) < key(b); });
-  for (Contender& contender : contenders) {
-    if (!has_time(contender)) continue;
-    contender.rank = 1 + std::count_if(contenders.begin(), contenders.end(), [&](const Contender& other) {
-                       return has_time(other) && quotient(*contender.seconds[0], *other.seconds[0]).low > 1;
-                     });
+void rank(std::vector<RankedCell>& cells) {
+  const auto key = [](const RankedCell& ranked) { return has_time(ranked) ? ranked.seconds[0]->value : kInfinity; };
+  std::stable_sort(cells.begin(), cells.end(), [&](const RankedCell& a, const RankedCell& b) { return key(a) < key(b); });
+  for (RankedCell& ranked : cells) {
+    if (!has_time(ranked)) continue;
+    ranked.rank = 1 + std::count_if(cells.begin(), cells.end(), [&](const RankedCell& other) {
+                    return has_time(other) && quotient(*ranked.seconds[0], *other.seconds[0]).low > 1;
+                  });
   }
-  const auto place = [](const Contender& contender) { return contender.rank.value_or(std::numeric_limits<std::size_t>::max()); };
-  std::stable_sort(contenders.begin(), contenders.end(),
-                   [&](const Contender& a, const Contender& b) { return place(a) < place(b); });
-  for (Contender& contender : contenders)
-    contender.tied = contender.rank && std::count_if(contenders.begin(), contenders.end(),
-                                                     [&](const Contender& other) { return other.rank == contender.rank; }) > 1;
+  const auto place = [](const RankedCell& ranked) { return ranked.rank.value_or(std::numeric_limits<std::size_t>::max()); };
+  std::stable_sort(cells.begin(), cells.end(), [&](const RankedCell& a, const RankedCell& b) { return place(a) < place(b); });
+  for (RankedCell& ranked : cells)
+    ranked.tied = ranked.rank && std::count_if(cells.begin(), cells.end(),
+                                               [&](const RankedCell& other) { return other.rank == ranked.rank; }) > 1;
 }
 
-void mark_pareto(std::vector<Contender>& contenders) {
-  for (Contender& one : contenders) {
+void mark_pareto(std::vector<RankedCell>& cells) {
+  for (RankedCell& one : cells) {
     if (!one.cost || !one.cost->ns_per_sample) continue;
-    const auto beats = [&](const Contender& other) {
+    const auto beats = [&](const RankedCell& other) {
       if (!other.cost || !other.cost->ns_per_sample) return false;
       const Real variance = one.cost->variance.value - other.cost->variance.value;
       const Real time = one.cost->ns_per_sample->value - other.cost->ns_per_sample->value;
       return variance >= 0 && time >= 0 && (variance > 0 || time > 0);
     };
-    one.pareto = std::none_of(contenders.begin(), contenders.end(), beats);
+    one.pareto = std::none_of(cells.begin(), cells.end(), beats);
   }
 }
 
-std::optional<std::size_t> best_unbiased(const std::vector<Contender>& contenders) {
+std::optional<std::size_t> best_unbiased(const std::vector<RankedCell>& cells) {
   std::optional<std::size_t> best;
-  const auto price = [&](std::size_t i) { return contenders[i].cost->variance_x_ns->value; };
-  for (std::size_t i = 0; i < contenders.size(); ++i) {
-    const Contender& contender = contenders[i];
-    if (!claims_unbiased(contender) || !contender.cost || !contender.cost->variance_x_ns || !(price(i) > 0)) continue;
+  const auto price = [&](std::size_t i) { return cells[i].cost->variance_x_ns->value; };
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const RankedCell& ranked = cells[i];
+    if (!claims_unbiased(ranked) || !ranked.cost || !ranked.cost->variance_x_ns || !(price(i) > 0)) continue;
     if (!best || price(i) < price(*best)) best = i;
   }
   return best;
 }
 
-bool is_named(const Contender& contender, const std::string& name) {
-  return contender.record->cell.estimator.type == name || tracker_label(contender.record->cell) == name ||
-         contender.label == name;
+bool is_named(const RankedCell& ranked, const std::string& name) {
+  return ranked.record->cell.estimator.type == name || tracker_label(ranked.record->cell) == name || ranked.label == name;
 }
 
 /// Why two cells are not of the same random streams, or their errors on them not known; empty where they are.
@@ -157,11 +156,11 @@ std::optional<Interval> ratio_of_means(const std::optional<Cost>& a, const std::
   return below.value > 0 ? std::optional(quotient(mean_square_error(*a, samples), below)) : std::nullopt;
 }
 
-void pair_up(Contest& contest, std::size_t one, std::size_t other) {
-  const Contender &first = contest.contenders[one], &second = contest.contenders[other];
+void pair_up(Comparison& comparison, std::size_t one, std::size_t other) {
+  const RankedCell &first = comparison.cells[one], &second = comparison.cells[other];
   const CellRecord &a = *first.record, &b = *second.record;
   if (const std::string reason = unlike(a, b); !reason.empty()) {
-    contest.unpaired.push_back({one, reason});
+    comparison.unpaired.push_back({one, reason});
     return;
   }
   const auto total = [](const CellRecord& record) {
@@ -169,7 +168,7 @@ void pair_up(Contest& contest, std::size_t one, std::size_t other) {
   };
   const Real of_a = total(a), of_b = total(b);
   if (only_rounding(a, of_a) || only_rounding(b, of_b)) {
-    contest.unpaired.push_back({one, "is exact but for rounding, or its baseline is"});
+    comparison.unpaired.push_back({one, "is exact but for rounding, or its baseline is"});
     return;
   }
   const auto log_without = [&](const CellRecord& record, Real all) {
@@ -179,64 +178,64 @@ void pair_up(Contest& contest, std::size_t one, std::size_t other) {
   const Real paired = jackknife_variance([&](std::size_t block) { return log_a(block) - log_b(block); });
   const Real alone = jackknife_variance(log_a) + jackknife_variance(log_b);
   if (!std::isfinite(paired) || !std::isfinite(alone)) {
-    contest.unpaired.push_back({one, "has all its error in one of the 16 parts, which leaves no interval"});
+    comparison.unpaired.push_back({one, "has all its error in one of the 16 parts, which leaves no interval"});
     return;
   }
   static const Real kStudent = boost::math::quantile(boost::math::students_t(BlockErrors::kBlocks - 1), 0.975) / kNormal975;
-  contest.pairings.push_back({one, other, relative(of_a / of_b, kStudent * std::sqrt(paired)),
-                              relative(of_a / of_b, kStudent * std::sqrt(alone)), a.cell.samples_per_ray,
-                              ratio_of_means(first.cost, second.cost, a.cell.samples_per_ray)});
+  comparison.pairings.push_back({one, other, relative(of_a / of_b, kStudent * std::sqrt(paired)),
+                                 relative(of_a / of_b, kStudent * std::sqrt(alone)), a.cell.samples_per_ray,
+                                 ratio_of_means(first.cost, second.cost, a.cell.samples_per_ray)});
 }
 
-void decide(Contest& contest, const std::vector<RunRecord>& runs, const std::string& baseline) {
-  std::vector<Contender>& contenders = contest.contenders;
-  rank(contenders);
-  tell_apart(contenders, runs);
-  mark_pareto(contenders);
-  contest.best_unbiased = best_unbiased(contenders);
-  const auto base = std::find_if(contenders.begin(), contenders.end(), [&](const Contender& contender) {
-    return baseline.empty() ? claims_unbiased(contender) : is_named(contender, baseline);
+void decide(Comparison& comparison, const std::vector<RunRecord>& runs, const std::string& baseline) {
+  std::vector<RankedCell>& cells = comparison.cells;
+  rank(cells);
+  tell_apart(cells, runs);
+  mark_pareto(cells);
+  comparison.best_unbiased = best_unbiased(cells);
+  const auto base = std::find_if(cells.begin(), cells.end(), [&](const RankedCell& ranked) {
+    return baseline.empty() ? claims_unbiased(ranked) : is_named(ranked, baseline);
   });
-  if (base != contenders.end()) contest.baseline = static_cast<std::size_t>(base - contenders.begin());
-  for (std::size_t i = 0; i < contenders.size(); ++i) {
-    Contender& contender = contenders[i];
-    if (contender.cost && contender.cost->floor && contest.best_unbiased)
-      contender.break_even = break_even(*contender.cost, *contenders[*contest.best_unbiased].cost);
-    if (!contest.baseline) continue;
-    if (has_time(contender) && has_time(*base))
-      contender.relative = i == *contest.baseline ? exactly(1) : quotient(*contender.seconds[0], *base->seconds[0]);
-    if (i != *contest.baseline) pair_up(contest, i, *contest.baseline);
+  if (base != cells.end()) comparison.baseline = static_cast<std::size_t>(base - cells.begin());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    RankedCell& ranked = cells[i];
+    if (ranked.cost && ranked.cost->floor && comparison.best_unbiased)
+      ranked.break_even = break_even(*ranked.cost, *cells[*comparison.best_unbiased].cost);
+    if (!comparison.baseline) continue;
+    if (has_time(ranked) && has_time(*base))
+      ranked.relative = i == *comparison.baseline ? exactly(1) : quotient(*ranked.seconds[0], *base->seconds[0]);
+    if (i != *comparison.baseline) pair_up(comparison, i, *comparison.baseline);
   }
 }
 
 }  // namespace
 
-std::vector<Contest> contests(const std::vector<RunRecord>& runs, const std::string& baseline) {
-  std::vector<Contest> all;
+std::vector<Comparison> comparisons(const std::vector<RunRecord>& runs, const std::string& baseline) {
+  std::vector<Comparison> all;
   std::map<std::string, std::size_t> places;
   std::vector<std::string> known;
   std::set<std::string> types;
   for (std::size_t run = 0; run < runs.size(); ++run)
     for (const CellRecord& record : runs[run].cells) {
       if (record.status != Status::ok || !record.outputs.empty()) continue;
-      Contest contest = empty_contest(record);
-      const auto [place, fresh] = places.try_emplace(contest.name, all.size());
-      if (fresh) all.push_back(std::move(contest));
-      Contender contender;
-      contender.run = run;
-      contender.record = &record;
-      contender.label = tracker_label(record.cell);
-      contender.cost = cost_of(record);
+      Comparison comparison = empty_comparison(record);
+      const auto [place, fresh] = places.try_emplace(comparison.name, all.size());
+      if (fresh) all.push_back(std::move(comparison));
+      RankedCell ranked;
+      ranked.run = run;
+      ranked.record = &record;
+      ranked.label = tracker_label(record.cell);
+      ranked.cost = cost_of(record);
       for (const Real target : kTargets) {
-        contender.seconds.push_back(contender.cost ? seconds_to(*contender.cost, target) : std::nullopt);
-        contender.amortised.push_back(contender.cost && is_amortised(*contender.cost, target));
+        ranked.seconds.push_back(ranked.cost ? seconds_to(*ranked.cost, target) : std::nullopt);
+        ranked.amortised.push_back(ranked.cost && is_amortised(*ranked.cost, target));
       }
-      known.insert(known.end(), {contender.label, record.cell.estimator.type});
+      known.insert(known.end(), {ranked.label, record.cell.estimator.type});
       types.insert(record.cell.estimator.type);
-      all[place->second].contenders.push_back(std::move(contender));
+      all[place->second].cells.push_back(std::move(ranked));
     }
-  for (Contest& contest : all) decide(contest, runs, baseline);
-  const auto has_baseline = [](const Contest& contest) { return contest.baseline.has_value(); };
+  for (Comparison& comparison : all) decide(comparison, runs, baseline);
+  const auto has_baseline = [](const Comparison& comparison) { return comparison.baseline.has_value(); };
   if (!baseline.empty() && std::none_of(all.begin(), all.end(), has_baseline)) {
     const std::string near = nearest(baseline, known);
     throw InputError(fmt::format(

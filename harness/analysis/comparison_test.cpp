@@ -39,11 +39,11 @@ CellRecord marching(Real floor, Real variance = 0, Real ns = 20) {
   return record;
 }
 
-Contest only_contest(const std::vector<CellRecord>& cells, const std::string& baseline = "") {
+Comparison only_comparison(const std::vector<CellRecord>& cells, const std::string& baseline = "") {
   static std::vector<RunRecord> runs;
   runs.assign(1, {});
   runs[0].cells = cells;
-  return contests(runs, baseline).at(0);
+  return comparisons(runs, baseline).at(0);
 }
 
 TEST(Cost, SecondsToATargetAreVarianceOverRoomTimesTheTimeOfASample) {
@@ -134,52 +134,52 @@ TEST(Cost, RoundingIsNoVarianceAndNoFloor) {
 }
 
 TEST(Comparison, TiesAreTimesWhoseRatioMayBeOne) {
-  const Contest contest =
-      only_contest({cell("slow", 0.04, 20), cell("ratio", 0.04, 10), cell("same", 0.04, 10.1), cell("exact", 0, 5)});
-  ASSERT_EQ(contest.contenders.size(), 4u);
-  EXPECT_EQ(contest.contenders[0].label, "exact");
-  EXPECT_EQ(contest.contenders[1].label, "ratio");
-  EXPECT_EQ(*contest.contenders[1].rank, 2u);
-  EXPECT_EQ(*contest.contenders[2].rank, 2u);
-  EXPECT_TRUE(contest.contenders[1].tied && contest.contenders[2].tied);
-  EXPECT_EQ(*contest.contenders[3].rank, 4u);
-  EXPECT_FALSE(contest.contenders[3].tied);
-  EXPECT_NEAR(contest.contenders[3].relative->value / contest.contenders[1].relative->value, 2, 1e-12);
+  const Comparison comparison =
+      only_comparison({cell("slow", 0.04, 20), cell("ratio", 0.04, 10), cell("same", 0.04, 10.1), cell("exact", 0, 5)});
+  ASSERT_EQ(comparison.cells.size(), 4u);
+  EXPECT_EQ(comparison.cells[0].label, "exact");
+  EXPECT_EQ(comparison.cells[1].label, "ratio");
+  EXPECT_EQ(*comparison.cells[1].rank, 2u);
+  EXPECT_EQ(*comparison.cells[2].rank, 2u);
+  EXPECT_TRUE(comparison.cells[1].tied && comparison.cells[2].tied);
+  EXPECT_EQ(*comparison.cells[3].rank, 4u);
+  EXPECT_FALSE(comparison.cells[3].tied);
+  EXPECT_NEAR(comparison.cells[3].relative->value / comparison.cells[1].relative->value, 2, 1e-12);
 }
 
 /// One whose time is hardly known is tied with the first, and stands before those that are proven slower.
 TEST(Comparison, RanksRise) {
   CellRecord vague = cell("vague", 0.04, 30);
   vague.time->repetition_ns = {1, 30, 59};
-  const Contest contest = only_contest({vague, cell("slow", 0.04, 20), cell("fast", 0.04, 10)});
-  ASSERT_EQ(contest.contenders.size(), 3u);
-  EXPECT_EQ(contest.contenders[0].label, "fast");
-  EXPECT_EQ(contest.contenders[1].label, "vague");
-  EXPECT_EQ(*contest.contenders[1].rank, 1u);
-  EXPECT_TRUE(contest.contenders[0].tied && contest.contenders[1].tied);
-  EXPECT_EQ(*contest.contenders[2].rank, 2u);
+  const Comparison comparison = only_comparison({vague, cell("slow", 0.04, 20), cell("fast", 0.04, 10)});
+  ASSERT_EQ(comparison.cells.size(), 3u);
+  EXPECT_EQ(comparison.cells[0].label, "fast");
+  EXPECT_EQ(comparison.cells[1].label, "vague");
+  EXPECT_EQ(*comparison.cells[1].rank, 1u);
+  EXPECT_TRUE(comparison.cells[0].tied && comparison.cells[1].tied);
+  EXPECT_EQ(*comparison.cells[2].rank, 2u);
 }
 
 TEST(Comparison, BaselinesAreTheFirstUnbiasedOrTheOneNamed) {
   std::vector<CellRecord> cells = {cell("delta", 0.1), cell("ratio"), marching(0.002)};
-  EXPECT_EQ(only_contest(cells).contenders[*only_contest(cells).baseline].label, "ratio");
-  EXPECT_EQ(only_contest(cells, "delta").contenders[*only_contest(cells, "delta").baseline].label, "delta");
-  EXPECT_THROW(only_contest(cells, "dleta"), InputError);
-  EXPECT_EQ(only_contest(cells).contenders[*only_contest(cells).best_unbiased].label, "ratio");
+  EXPECT_EQ(only_comparison(cells).cells[*only_comparison(cells).baseline].label, "ratio");
+  EXPECT_EQ(only_comparison(cells, "delta").cells[*only_comparison(cells, "delta").baseline].label, "delta");
+  EXPECT_THROW(only_comparison(cells, "dleta"), InputError);
+  EXPECT_EQ(only_comparison(cells).cells[*only_comparison(cells).best_unbiased].label, "ratio");
 }
 
 TEST(Comparison, TheSameTrackerTwiceIsToldApart) {
   std::vector<CellRecord> cells = {cell("ratio"), cell("ratio"), cell("delta")};
   cells[1].cell.seed = 2;
-  const Contest contest = only_contest(cells);
+  const Comparison comparison = only_comparison(cells);
   std::set<std::string> labels;
-  for (const Contender& contender : contest.contenders) labels.insert(contender.label);
+  for (const RankedCell& ranked : comparison.cells) labels.insert(ranked.label);
   EXPECT_EQ(labels, (std::set<std::string>{"ratio/seed:1", "ratio/seed:2", "delta"}));
 }
 
 TEST(Comparison, ParetoFrontHoldsWhatNoneBeatsInBoth) {
-  const Contest contest = only_contest({cell("a", 1, 10), cell("b", 0.5, 20), cell("dominated", 1, 20)});
-  for (const Contender& contender : contest.contenders) EXPECT_EQ(contender.pareto, contender.label != "dominated");
+  const Comparison comparison = only_comparison({cell("a", 1, 10), cell("b", 0.5, 20), cell("dominated", 1, 20)});
+  for (const RankedCell& ranked : comparison.cells) EXPECT_EQ(ranked.pareto, ranked.label != "dominated");
 }
 
 TEST(Comparison, CommonStreamsMakeRatiosOfErrorsSharper) {
@@ -189,14 +189,14 @@ TEST(Comparison, CommonStreamsMakeRatiosOfErrorsSharper) {
     a.squared_error_blocks.push_back(1 + (i % 2 == 0 ? 0.5 : -0.5));
     b.squared_error_blocks.push_back(4 * a.squared_error_blocks.back());
   }
-  const Contest contest = only_contest({a, b}, "a");
-  ASSERT_EQ(contest.pairings.size(), 1u);
-  EXPECT_NEAR(contest.pairings[0].ratio.value, 4, 1e-12);
-  EXPECT_NEAR(contest.pairings[0].ratio.high, 4, 1e-9);
-  EXPECT_GT(contest.pairings[0].unpaired.high, 4.5);
-  EXPECT_FALSE(contest.pairings[0].of_the_means);
+  const Comparison comparison = only_comparison({a, b}, "a");
+  ASSERT_EQ(comparison.pairings.size(), 1u);
+  EXPECT_NEAR(comparison.pairings[0].ratio.value, 4, 1e-12);
+  EXPECT_NEAR(comparison.pairings[0].ratio.high, 4, 1e-9);
+  EXPECT_GT(comparison.pairings[0].unpaired.high, 4.5);
+  EXPECT_FALSE(comparison.pairings[0].of_the_means);
   b.cell.seed = 2;
-  const Contest other = only_contest({a, b}, "a");
+  const Comparison other = only_comparison({a, b}, "a");
   EXPECT_TRUE(other.pairings.empty());
   ASSERT_EQ(other.unpaired.size(), 1u);
   EXPECT_EQ(other.unpaired[0].reason, "has another seed");
@@ -209,10 +209,10 @@ TEST(Comparison, TheErrorOfOneSampleDoesNotSpeakForAMarchWithAFloor) {
     unbiased.squared_error_blocks.push_back(0.04 * (i % 2 == 0 ? 0.9 : 1.1));
     march.squared_error_blocks.push_back(0.025 * 0.025);
   }
-  const Contest contest = only_contest({unbiased, march});
-  ASSERT_EQ(contest.pairings.size(), 1u);
-  EXPECT_NEAR(contest.pairings[0].ratio.value, 1. / 64, 1e-9);
-  EXPECT_NEAR(contest.pairings[0].of_the_means->value, 0.025 * 0.025 / (0.04 / 100), 1e-9);
+  const Comparison comparison = only_comparison({unbiased, march});
+  ASSERT_EQ(comparison.pairings.size(), 1u);
+  EXPECT_NEAR(comparison.pairings[0].ratio.value, 1. / 64, 1e-9);
+  EXPECT_NEAR(comparison.pairings[0].of_the_means->value, 0.025 * 0.025 / (0.04 / 100), 1e-9);
   std::vector<RunRecord> runs(1);
   runs[0].cells = {unbiased, march};
   for (const std::string& text : {compare_text(runs, "", true), compare_markdown(runs, "", true)}) {
@@ -231,16 +231,16 @@ TEST(Comparison, PairedIntervalsHoldTheTrueRatio) {
   int covered = 0, sharper = 0;
   constexpr int kRuns = 200;
   for (int seed = 1; seed <= kRuns; ++seed) {
-    const Plan plan = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e",
-        "rays":"single","samples_per_ray":4096,"gate":{"enabled":false},
+    const Plan plan = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e",
+        "rays":"single","samples_per_ray":4096,"verdict":{"enabled":false},
         "matrix":{"estimator":["ratio","delta"],"medium":{"type":"linear","optical_depth":1}}}]})",
                                   "test.json", static_cast<std::uint64_t>(seed));
     RunRecord run;
     run.cells = run_untimed(plan);
     const std::vector<RunRecord> runs = {run};
-    const Contest contest = contests(runs, "delta").at(0);
-    ASSERT_EQ(contest.pairings.size(), 1u);
-    const Interval ratio = contest.pairings[0].ratio;
+    const Comparison comparison = comparisons(runs, "delta").at(0);
+    ASSERT_EQ(comparison.pairings.size(), 1u);
+    const Interval ratio = comparison.pairings[0].ratio;
     const auto theory = [&](std::size_t i) {
       return *std::find_if(run.cells.begin(), run.cells.end(),
                            [&](const CellRecord& record) { return record.cell.estimator.type == (i == 0 ? "ratio" : "delta"); })
@@ -249,7 +249,7 @@ TEST(Comparison, PairedIntervalsHoldTheTrueRatio) {
     };
     const Real truth = theory(0) / theory(1);
     covered += ratio.low <= truth && truth <= ratio.high;
-    sharper += ratio.high / ratio.low < contest.pairings[0].unpaired.high / contest.pairings[0].unpaired.low;
+    sharper += ratio.high / ratio.low < comparison.pairings[0].unpaired.high / comparison.pairings[0].unpaired.low;
   }
   EXPECT_GE(covered, kRuns * 88 / 100);
   EXPECT_LT(covered, kRuns);

@@ -31,7 +31,7 @@ RunRecord run_of(
 }
 
 CellRecord record_of(const std::string& experiment) {
-  return run_of(read_config(fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[
+  return run_of(read_config(fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[
                                             {{"name":"e","rays":"single",{}}}]}})",
                                         experiment),
                             "test.json"))
@@ -80,7 +80,7 @@ TEST(HardCases, MeansThatUnderflowAreJudged) {
 TEST(HardCases, WalksThatDoNotEndAreCounted) {
   EstimatorTemplate<RatioTracking> source;
   const auto medium = constant(1000);
-  RayContext context;
+  PreparedRay context;
   context.local = context.world = Ray{{0, 0.5, 0.5}, Vec3::UnitX(), 0, 1};
   context.segments.segments = {{0, 1, 1000, medium->extrema(medium->bounds())}};
   for (const auto precision : {Precision::float64, Precision::float32}) {
@@ -102,7 +102,7 @@ TEST(HardCases, WalksThatDoNotEndAreCounted) {
 /// Samples so small that their fourth moments are no numbers show no variance that a verdict could rest on.
 TEST(HardCases, PilotsWhoseMomentsUnderflowAreNotTrusted) {
   const CellRecord record = record_of(
-      R"("samples_per_ray":64,"gate":{"max_samples_per_ray":100000,"laws":"never"},"matrix":{"estimator":"p_series_cumulative",
+      R"("samples_per_ray":64,"verdict":{"max_samples_per_ray":100000,"laws":"never"},"matrix":{"estimator":"p_series_cumulative",
          "medium":{"type":"layers","values":[1,0,3,0.5],"optical_depth":100}})");
   ASSERT_TRUE(record.verdict);
   EXPECT_EQ(record.verdict->unbiased, Outcome::inconclusive) << record.verdict->reason;
@@ -121,7 +121,7 @@ TEST(HardCases, PilotsThatSawNoLookupProveNothingOfTheirNumber) {
 /// Beyond the panels of a profile nothing is stated of lookups, and what they may cost is reckoned by the majorant's depth.
 TEST(HardCases, LookupsThatAreNotStatedAreBudgeted) {
   const CellRecord record = record_of(
-      R"("samples_per_ray":4,"gate":{"max_samples_per_ray":2000,"max_lookups_per_ray":1e6,"laws":"never"},"matrix":{"estimator":"delta",
+      R"("samples_per_ray":4,"verdict":{"max_samples_per_ray":2000,"max_lookups_per_ray":1e6,"laws":"never"},"matrix":{"estimator":"delta",
          "medium":{"type":"homogeneous","extinction":1},"majorant":{"type":"global","looseness":1e5}})");
   ASSERT_TRUE(record.verdict);
   EXPECT_FALSE(record.lookups_theory);
@@ -142,13 +142,13 @@ TEST(HardCases, VoxelsOfAnySizeGiveTheSameTransmittance) {
         for (int k = 0; k < 20; ++k) grid->tree().setValue({i - 7, j, k}, static_cast<float>((i * 7 % 5 + j % 3 + k % 2) / 64.));
     const std::string file = fmt::format("{}nullmark_voxels_{}_{}.vdb", ::testing::TempDir(), ::getpid(), voxel);
     openvdb::io::File(file).write({grid});
-    const RunRecord run = run_of(
-        read_config(fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e",
-            "rays":{{"type":"orthographic","width":4,"height":4,"axis":"y"}},"samples_per_ray":4096,"gate":{{"epsilon":0.05,"max_samples_per_ray":1000000}},
+    const RunRecord run =
+        run_of(read_config(fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e",
+            "rays":{{"type":"orthographic","width":4,"height":4,"axis":"y"}},"samples_per_ray":4096,"verdict":{{"epsilon":0.05,"max_samples_per_ray":1000000}},
             "matrix":{{"estimator":["regular","ratio","delta"],"majorant":["global",{{"type":"grid","resolution":4}}],
                        "medium":{{"type":"vdb","file":"{}","extinction_per_value":{}}}}}}}]}})",
-                                file, 1 / voxel),
-                    "test.json"));
+                                       file, 1 / voxel),
+                           "test.json"));
     std::filesystem::remove(file);
     return run.cells;
   };
@@ -203,8 +203,8 @@ TEST(HardCases, ReferencesAgreeWithLongDouble) {
 
 /// The table's numbers are those of its cells.
 TEST(HardCases, TheTableTellsTheWorstOfEachTracker) {
-  const Plan plan = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
-      {"name":"one","rays":"single","samples_per_ray":64,"gate":{"laws":"never"},
+  const Plan plan = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
+      {"name":"one","rays":"single","samples_per_ray":64,"verdict":{"laws":"never"},
        "matrix":{"estimator":["closed_form","ratio","delta"],"medium":[{"type":"homogeneous","extinction":1},{"type":"homogeneous","extinction":2}],
                  "majorant":{"type":"global","looseness":0.9}}}]})",
                                 "test.json");

@@ -24,10 +24,9 @@ TEST(Scaling, APowerLawIsFoundWithTheScatterAroundIt) {
 }
 
 std::vector<CellRecord> sampled(const std::string& matrix) {
-  const Plan plan =
-      read_config(R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":10,"matrix":{)" +
-                      matrix + "}}]}",
-                  "test.json");
+  const Plan plan = read_config(
+      R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":10,"matrix":{)" + matrix + "}}]}",
+      "test.json");
   std::vector<CellRecord> cells;
   for (const Cell& cell : plan.cells) {
     CellRecord record;

@@ -26,6 +26,7 @@
 #include "harness/run/merge.h"
 #include "harness/run/provenance.h"
 #include "media/base/registry.h"
+#include "media/majorants/register_majorant.h"
 #include "media/volumes/vdb_writer.h"
 
 namespace nullmark {

@@ -10,7 +10,7 @@ class Cli : public ProgramTest {
  protected:
   void SetUp() override {
     ProgramTest::SetUp();
-    write("c.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
+    write("c.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
       {"name":"e","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":50,
        "matrix":{"estimator":["ratio","delta","residual_ratio"],"medium":["linear",{"type":"linear","end":2}]}}]})");
   }
@@ -37,7 +37,7 @@ TEST_F(Cli, NoOutputReplacesAnInputOrAnotherOutput) {
   std::filesystem::create_directory(folder_ / "folder");
   std::filesystem::copy_file(folder_ / "c.json", folder_ / "folder/d.json");
   write("v.vdb", "a volume");
-  write("v.json", R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
+  write("v.json", R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
       "matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"v.vdb"}}}]})");
   const std::string before = read("a.json"), config = read("c.json");
   for (const char* arguments :
@@ -105,7 +105,7 @@ TEST_F(Cli, SeedsChangeStatisticsAndAreRecorded) {
 }
 
 TEST_F(Cli, InterruptKeepsWhatIsDone) {
-  write("long.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
+  write("long.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
       {"name":"e","rays":{"type":"orthographic"},"samples_per_ray":[1],"matrix":{"estimator":"ratio","medium":["linear"]}},
       {"name":"f","rays":{"type":"orthographic","width":64,"height":64},"samples_per_ray":2000000,"matrix":{"estimator":"ratio","medium":["linear"]}}]})");
   const std::string command =
@@ -121,16 +121,16 @@ TEST_F(Cli, InterruptKeepsWhatIsDone) {
 TEST_F(Cli, ErrorsAreOneLineWithTheRightCode) {
   write(
       "bad.json",
-      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratoi","medium":"linear"}}]})");
+      R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratoi","medium":"linear"}}]})");
   write(
       "clash.json",
-      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"linear","hi":[0,1,1]}}}]})");
+      R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"linear","hi":[0,1,1]}}}]})");
   write(
       "missing.json",
-      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"nowhere.vdb"}}}]})");
+      R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"nowhere.vdb"}}}]})");
   write(
       "optional.json",
-      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"nowhere.vdb","optional":true}}}]})");
+      R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"nowhere.vdb","optional":true}}}]})");
   const std::vector<std::pair<std::string, ExitCode>> cases = {{"rnu", ExitCode::input_error},
                                                                {"run", ExitCode::input_error},
                                                                {"run nowhere.json", ExitCode::input_error},
@@ -209,7 +209,7 @@ TEST_F(Cli, FiguresWithoutABrowserAreRefusedAtOnce) {
 }
 
 TEST_F(Cli, TimingTellsHowFarItIs) {
-  write("t.json", R"({"$schema":"nullmark/config/1","timing":{"repetitions":2,"seconds":0.0001},"experiments":[
+  write("t.json", R"({"nullmark":"config/2","timing":{"repetitions":2,"seconds":0.0001},"experiments":[
       {"name":"e","rays":"single","samples_per_ray":10,"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}]})");
   ASSERT_EQ(run("run t.json"), 0) << read("err");
   EXPECT_NE(read("err").find("timing 1/2\ntiming 2/2\n"), std::string::npos) << read("err");
@@ -242,7 +242,7 @@ TEST_F(Cli, ListsSchemasAndVersion) {
 }
 
 TEST_F(Cli, ADryRunOfNothingEndsAsTheRunWould) {
-  write("v.json", R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
+  write("v.json", R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
       "matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"absent.vdb","optional":true}}}]})");
   EXPECT_EQ(run("run v.json --dry-run"), code(ExitCode::nothing_ran));
   EXPECT_EQ(read("err"), "nullmark: nothing would run: all cells are skipped\n");

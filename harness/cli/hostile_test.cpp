@@ -34,8 +34,8 @@ std::string sweep(int numbers) {
 }
 
 std::string config(const std::string& medium, const std::string& more) {
-  return R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","matrix":{"estimator":"ratio","medium":)" +
-         medium + "," + more + "}}]}";
+  return R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","matrix":{"estimator":"ratio","medium":)" + medium +
+         "," + more + "}}]}";
 }
 
 TEST(Hostile, DeepNestingIsRefusedWhereItBegins) {
@@ -69,8 +69,8 @@ TEST(Hostile, ManyCellsAreExpandedInLinearTime) {
 
 /// A thousand cells on the same rays.
 std::string many_rays(const std::string& rays) {
-  return R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","samples_per_ray":1,"matrix":{"estimator":"ratio","rays":)" +
-         rays + R"(,"medium":{"type":"linear","end":)" + sweep(1000) + "}}}]}";
+  return R"({"nullmark":"config/2","experiments":[{"name":"e","samples_per_ray":1,"matrix":{"estimator":"ratio","rays":)" + rays +
+         R"(,"medium":{"type":"linear","end":)" + sweep(1000) + "}}}]}";
 }
 
 TEST(Hostile, RaysThatNoMachineHoldsAreRefused) {

@@ -14,32 +14,32 @@ namespace nullmark {
 /// {"cell": name}.
 class CellPatterns : public CellReader {
  public:
-  /// Of a configuration file: `drafts` are its cells, which in the plan begin at `first`; `experiments` are the file's own names.
-  CellPatterns(const Plan& plan, std::size_t first, std::span<const Draft> drafts, std::vector<std::string> experiments);
+  /// Of a configuration file: `cells` are its cells, which in the plan begin at `first`; `experiments` are the file's own names.
+  CellPatterns(const Plan& plan, std::size_t first, std::span<const ConfiguredCell> cells, std::vector<std::string> experiments);
 
-  std::string one(const Place& place) const override;
+  std::string one(const JsonNode& node) const override;
 
-  std::vector<std::string> all(const Place& place) const override;
+  std::vector<std::string> all(const JsonNode& node) const override;
 
   /// For each cell that `of` finds, the one that fits the pattern `place` and agrees with it on all axes that the pattern does
   /// not name (experiments count as one); of several, the one whose estimator differs in no parameter but those named.  Throws
   /// InputError where there is not exactly one.
-  std::vector<std::string> counterparts(const Place& of, const Place& place) const override;
+  std::vector<std::string> counterparts(const JsonNode& of, const JsonNode& node) const override;
 
   bool is_judged(const std::string& name) const override;
 
  private:
-  [[noreturn]] void matches_none(const Place& place, const char* expected) const;
-  std::vector<std::size_t> matching(const Place& place) const;
-  std::string named(const Place& place) const;
-  std::string described(std::size_t draft) const;
-  const std::string& name(std::size_t draft) const { return plan_->cells[first_ + draft].name; }
+  [[noreturn]] void matches_none(const JsonNode& node, const char* expected) const;
+  std::vector<std::size_t> matching(const JsonNode& node) const;
+  std::string named(const JsonNode& node) const;
+  std::string described(std::size_t configured) const;
+  const std::string& name(std::size_t configured) const { return plan_->cells[first_ + configured].name; }
 
   const Plan* plan_;
   std::size_t first_;
-  std::span<const Draft> drafts_;
+  std::span<const ConfiguredCell> cells_;
   std::vector<std::string> experiments_;
-  std::map<std::string, bool> judged_;  ///< whether the plan's cell of a name has its gate on
+  std::map<std::string, bool> judged_;  ///< whether the plan's cell of a name gets a verdict
 };
 
 }  // namespace nullmark

@@ -23,20 +23,20 @@ std::string expectation(const Range& range, const std::string& unit) {
   return unit.empty() ? text : text + " in " + unit;
 }
 
-Real number_within(const Place& place, const Range& range, const std::string& unit) {
-  if (!place.json().is_number()) place.expected(expectation(range, unit));
-  const Real value = place.number();
-  if (!std::isfinite(value) || !range.contains(value)) place.expected(expectation(range, unit));
+Real number_within(const JsonNode& node, const Range& range, const std::string& unit) {
+  if (!node.json().is_number()) node.expected(expectation(range, unit));
+  const Real value = node.number();
+  if (!std::isfinite(value) || !range.contains(value)) node.expected(expectation(range, unit));
   return value;
 }
 
-std::vector<Real> numbers_within(const Place& place, std::size_t least, std::size_t most, const Range& range,
+std::vector<Real> numbers_within(const JsonNode& node, std::size_t least, std::size_t most, const Range& range,
                                  const std::string& unit) {
   const std::string length =
       least == most ? fmt::format("a list of {} numbers", least) : fmt::format("a list of {} to {} numbers", least, most);
-  if (!place.json().is_array() || place.json().size() < least || place.json().size() > most) place.expected(length);
+  if (!node.json().is_array() || node.json().size() < least || node.json().size() > most) node.expected(length);
   std::vector<Real> values;
-  for (const Place& element : place.elements()) values.push_back(number_within(element, range, unit));
+  for (const JsonNode& element : node.elements()) values.push_back(number_within(element, range, unit));
   return values;
 }
 
@@ -45,37 +45,38 @@ bool holds_list(const ParameterInfo& parameter) {
          std::holds_alternative<std::array<Real, 3>>(parameter.default_value);
 }
 
-ParameterValue read_value(const ParameterInfo& parameter, const Place& place) {
+ParameterValue read_value(const ParameterInfo& parameter, const JsonNode& node) {
   switch (parameter.default_value.index()) {
     case 0:
-      return number_within(place, parameter.range, parameter.unit);
+      return number_within(node, parameter.range, parameter.unit);
     case 1:
-      return static_cast<int>(place.integer(parameter.low, parameter.high));
+      return static_cast<int>(node.integer(parameter.low, parameter.high));
     case 2:
-      return place.boolean();
+      return node.boolean();
     case 3:
-      return parameter.allowed.empty() ? place.string() : place.one_of(parameter.allowed, parameter.name.c_str());
+      return parameter.allowed.empty() ? node.string() : node.one_of(parameter.allowed, parameter.name.c_str());
     case 4:
-      return numbers_within(place, static_cast<std::size_t>(parameter.least), static_cast<std::size_t>(parameter.most),
+      return numbers_within(node, static_cast<std::size_t>(parameter.least), static_cast<std::size_t>(parameter.most),
                             parameter.range, parameter.unit);
     default: {
-      const std::vector<Real> point = numbers_within(place, 3, 3, Range::any(), parameter.unit);
+      const std::vector<Real> point = numbers_within(node, 3, 3, Range::any(), parameter.unit);
       return std::array{point[0], point[1], point[2]};
     }
   }
 }
 
 /// One value, or each of a swept list's.
-std::vector<Place> swept(const Place& place, bool value_is_list) {
-  const Json& json = place.json();
+std::vector<JsonNode> swept(const JsonNode& node, bool value_is_list) {
+  const Json& json = node.json();
   const bool sweep = json.is_array() && (!value_is_list || (!json.empty() && json[0].is_array()));
-  if (sweep && json.empty()) place.expected("at least one value");
-  return sweep ? place.elements() : std::vector<Place>{place};
+  if (sweep && json.empty()) node.expected("at least one value");
+  return sweep ? node.elements() : std::vector<JsonNode>{node};
 }
 
 template <class Spec, class Value, class Set>
-std::vector<Spec> crossed(const Place& place, const std::vector<Spec>& specs, const std::vector<Value>& values, const Set& set) {
-  expect_cells(place, specs.size(), values.size());
+std::vector<Spec> crossed(const JsonNode& node, const std::vector<Spec>& specs, const std::vector<Value>& values,
+                          const Set& set) {
+  expect_cells(node, specs.size(), values.size());
   std::vector<Spec> result;
   for (const Spec& spec : specs)
     for (const Value& value : values) {
@@ -93,12 +94,12 @@ std::vector<std::string> names_of(const std::vector<ComponentInfo>& entries) {
 }
 
 /// The entry's type, checked, and the place to blame for it.
-std::string read_type(ComponentKind kind, const Place& place) {
+std::string read_type(ComponentKind kind, const JsonNode& node) {
   std::vector<std::string> names = names_of(registered(kind));
   if (kind == ComponentKind::medium) names.insert(names.end(), {kChannels, kSum});
-  if (!place.json().is_string() && !place.json().is_object())
-    place.expected(fmt::format("the name of a {} or an object with \"type\"", to_string(kind)));
-  const Place type = place.json().is_string() ? place : place["type"];
+  if (!node.json().is_string() && !node.json().is_object())
+    node.expected(fmt::format("the name of a {} or an object with \"type\"", to_string(kind)));
+  const JsonNode type = node.json().is_string() ? node : node["type"];
   if (kind == ComponentKind::estimator && type.json().is_string() && is_planted(type.string())) return type.string();
   return type.one_of(names, to_string(kind));
 }
@@ -107,38 +108,38 @@ std::string read_type(ComponentKind kind, const Place& place) {
 const std::vector<std::string> kMatterKeys = {"albedo", "anisotropy", "emission", "optional"};
 
 /// Media whose optical depth no parameter sets have others that do.
-void tell_of_extinction(const Place& place, const std::string& type, const std::vector<ParameterInfo>& parameters) {
+void tell_of_extinction(const JsonNode& node, const std::string& type, const std::vector<ParameterInfo>& parameters) {
   std::vector<std::string> names;
   for (const ParameterInfo& parameter : parameters)
     if (parameter.unit == "1/length") names.push_back(fmt::format("\"{}\"", parameter.name));
   if (!names.empty())
-    place.fail(fmt::format("{} has no optical_depth; its extinction is set by {}", type, fmt::join(names, ", ")));
+    node.fail(fmt::format("{} has no optical_depth; its extinction is set by {}", type, fmt::join(names, ", ")));
 }
 
 /// Components with the values that are given; `extra` keys are someone else's.
-std::vector<Component> read_given(ComponentKind kind, const Place& place, const std::vector<std::string>& extra = {}) {
+std::vector<Component> read_given(ComponentKind kind, const JsonNode& node, const std::vector<std::string>& extra = {}) {
   Component first;
-  first.type = read_type(kind, place);
-  first.pointer = place.where();
+  first.type = read_type(kind, node);
+  first.pointer = node.where();
   std::vector<Component> components = {first};
-  if (place.json().is_string()) return components;
+  if (node.json().is_string()) return components;
 
   const std::vector<ParameterInfo> parameters = parameters_of(kind, first.type);
   std::vector<std::string> keys = extra;
   keys.push_back("type");
   for (const ParameterInfo& parameter : parameters) keys.push_back(parameter.name);
-  for (const auto& [key, json] : place.json().items()) {
+  for (const auto& [key, json] : node.json().items()) {
     const auto named = [&name = key](const ParameterInfo& parameter) { return parameter.name == name; };
     const auto parameter = std::find_if(parameters.begin(), parameters.end(), named);
     if (parameter == parameters.end()) {
-      if (kind == ComponentKind::medium && key == "optical_depth") tell_of_extinction(place[key], first.type, parameters);
+      if (kind == ComponentKind::medium && key == "optical_depth") tell_of_extinction(node[key], first.type, parameters);
       if (key.rfind("x-", 0) != 0 && std::find(keys.begin(), keys.end(), key) == keys.end())
-        place[key].unknown(fmt::format("parameter of {}", first.type), key, keys);
+        node[key].unknown(fmt::format("parameter of {}", first.type), key, keys);
       continue;
     }
     std::vector<ParameterValue> values;
-    for (const Place& value : swept(place[key], holds_list(*parameter))) values.push_back(read_value(*parameter, value));
-    components = crossed(place, components, values,
+    for (const JsonNode& value : swept(node[key], holds_list(*parameter))) values.push_back(read_value(*parameter, value));
+    components = crossed(node, components, values,
                          [&name = key](Component& component, const ParameterValue& value) { component.values[name] = value; });
   }
   return components;
@@ -181,29 +182,29 @@ void complete(MediumSpec& medium) {
   add_matter_label(medium);
 }
 
-std::vector<MediumSpec> read_given_media(const Place& place);
+std::vector<MediumSpec> read_given_media(const JsonNode& node);
 
-Real read_anisotropy(const Place& place) {
-  const Real g = place.number();
-  if (!(g > -1 && g < 1)) place.expected("a mean cosine between -1 and 1");
+Real read_anisotropy(const JsonNode& node) {
+  const Real g = node.number();
+  if (!(g > -1 && g < 1)) node.expected("a mean cosine between -1 and 1");
   return g;
 }
 
 /// What the media do to light beside removing it.
-std::vector<MediumSpec> with_matter(std::vector<MediumSpec> media, const Place& place) {
-  if (!place.json().is_object()) return media;
-  if (place.has("albedo")) {
+std::vector<MediumSpec> with_matter(std::vector<MediumSpec> media, const JsonNode& node) {
+  if (!node.json().is_object()) return media;
+  if (node.has("albedo")) {
     std::vector<std::vector<Real>> albedos;
-    for (const Place& albedo : swept(place["albedo"], true)) albedos.push_back(read_per_channel(albedo, 1));
-    media = crossed(place, media, albedos, [](MediumSpec& medium, const std::vector<Real>& albedo) { medium.albedo = albedo; });
+    for (const JsonNode& albedo : swept(node["albedo"], true)) albedos.push_back(read_per_channel(albedo, 1));
+    media = crossed(node, media, albedos, [](MediumSpec& medium, const std::vector<Real>& albedo) { medium.albedo = albedo; });
   }
-  if (place.has("anisotropy")) {
+  if (node.has("anisotropy")) {
     std::vector<Real> cosines;
-    for (const Place& g : swept(place["anisotropy"], false)) cosines.push_back(read_anisotropy(g));
-    media = crossed(place, media, cosines, [](MediumSpec& medium, Real g) { medium.anisotropy = g; });
+    for (const JsonNode& g : swept(node["anisotropy"], false)) cosines.push_back(read_anisotropy(g));
+    media = crossed(node, media, cosines, [](MediumSpec& medium, Real g) { medium.anisotropy = g; });
   }
-  if (!place.has("emission")) return media;
-  const Place emission = place["emission"];
+  if (!node.has("emission")) return media;
+  const JsonNode emission = node["emission"];
   if (!emission.json().is_object()) {
     for (MediumSpec& medium : media) medium.emission = read_per_channel(emission, kInfinity);
     return media;
@@ -219,77 +220,77 @@ std::vector<MediumSpec> with_matter(std::vector<MediumSpec> media, const Place& 
   return media;
 }
 
-std::vector<MediumSpec> read_given_media(const Place& place) {
+std::vector<MediumSpec> read_given_media(const JsonNode& node) {
   MediumSpec first;
-  if (place.json().is_object() && place.has("optional")) first.optional = place["optional"].boolean();
+  if (node.json().is_object() && node.has("optional")) first.optional = node["optional"].boolean();
   std::vector<MediumSpec> media = {first};
 
-  if (const std::string type = read_type(ComponentKind::medium, place); is_composed(type)) {
-    if (!place.json().is_object()) place.expected("an object with \"type\" and \"media\"");
+  if (const std::string type = read_type(ComponentKind::medium, node); is_composed(type)) {
+    if (!node.json().is_object()) node.expected("an object with \"type\" and \"media\"");
     std::vector<std::string> keys = kMatterKeys;
     keys.insert(keys.end(), {"type", "media"});
-    place.expect_keys(keys);
-    const std::vector<Place> channels = place["media"].elements();
+    node.expect_keys(keys);
+    const std::vector<JsonNode> channels = node["media"].elements();
     if (channels.empty() || channels.size() > kMaxChannels)
-      place["media"].expected(fmt::format("1 to {} grey media", kMaxChannels));
+      node["media"].expected(fmt::format("1 to {} grey media", kMaxChannels));
     media[0].field.type = type;
-    media[0].field.pointer = place.where();
-    for (const Place& channel : channels) {
+    media[0].field.pointer = node.where();
+    for (const JsonNode& channel : channels) {
       const std::vector<MediumSpec> variants = read_given_media(channel);
       if (!variants[0].spectrum.empty() || !variants[0].per_channel.empty())
         channel.fail(fmt::format("its medium must be grey; expected neither \"spectrum\" nor \"{0}\" inside \"{0}\"", type));
       if (!variants[0].albedo.empty() || !variants[0].emission.empty() || variants[0].anisotropy != 0)
         channel.fail(
             fmt::format("\"albedo\", \"anisotropy\" and \"emission\" belong to the whole; expected them beside \"media\""));
-      media = crossed(place, media, variants,
+      media = crossed(node, media, variants,
                       [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
     }
-    return with_matter(media, place);
+    return with_matter(media, node);
   }
 
   std::vector<std::string> keys = kMatterKeys;
   keys.emplace_back("spectrum");
-  const std::vector<Component> fields = read_given(ComponentKind::medium, place, keys);
-  media = crossed(place, media, fields, [](MediumSpec& medium, const Component& field) { medium.field = field; });
-  if (place.json().is_object() && place.has("spectrum")) {
+  const std::vector<Component> fields = read_given(ComponentKind::medium, node, keys);
+  media = crossed(node, media, fields, [](MediumSpec& medium, const Component& field) { medium.field = field; });
+  if (node.json().is_object() && node.has("spectrum")) {
     std::vector<std::vector<Real>> spectra;
-    for (const Place& spectrum : swept(place["spectrum"], true))
+    for (const JsonNode& spectrum : swept(node["spectrum"], true))
       spectra.push_back(numbers_within(spectrum, 1, kMaxChannels, Range::non_negative(), ""));
     media =
-        crossed(place, media, spectra, [](MediumSpec& medium, const std::vector<Real>& spectrum) { medium.spectrum = spectrum; });
+        crossed(node, media, spectra, [](MediumSpec& medium, const std::vector<Real>& spectrum) { medium.spectrum = spectrum; });
   }
-  return with_matter(media, place);
+  return with_matter(media, node);
 }
 
 }  // namespace
 
-void expect_cells(const Place& place, std::size_t a, std::size_t b) {
+void expect_cells(const JsonNode& node, std::size_t a, std::size_t b) {
   constexpr std::size_t kMost = 100'000;
-  if (b > 0 && a > kMost / b) place.fail(fmt::format("its sweeps make more than {} cells; split them into several files", kMost));
+  if (b > 0 && a > kMost / b) node.fail(fmt::format("its sweeps make more than {} cells; split them into several files", kMost));
 }
 
-std::vector<Component> read_components(ComponentKind kind, const Place& place) {
-  std::vector<Component> components = read_given(kind, place);
+std::vector<Component> read_components(ComponentKind kind, const JsonNode& node) {
+  std::vector<Component> components = read_given(kind, node);
   for (Component& component : components) complete(kind, component);
   return components;
 }
 
-std::vector<MediumSpec> read_media(const Place& place) {
-  std::vector<MediumSpec> media = read_given_media(place);
+std::vector<MediumSpec> read_media(const JsonNode& node) {
+  std::vector<MediumSpec> media = read_given_media(node);
   for (MediumSpec& medium : media) complete(medium);
   return media;
 }
 
-std::vector<Component> read_component_patterns(ComponentKind kind, const Place& place) {
+std::vector<Component> read_component_patterns(ComponentKind kind, const JsonNode& node) {
   std::vector<Component> patterns;
-  for (const Place& entry : place.elements_or_self())
+  for (const JsonNode& entry : node.elements_or_self())
     for (Component& pattern : read_given(kind, entry)) patterns.push_back(std::move(pattern));
   return patterns;
 }
 
-std::vector<MediumSpec> read_medium_patterns(const Place& place) {
+std::vector<MediumSpec> read_medium_patterns(const JsonNode& node) {
   std::vector<MediumSpec> patterns;
-  for (const Place& entry : place.elements_or_self()) {
+  for (const JsonNode& entry : node.elements_or_self()) {
     // "channels" alone is a pattern, though no medium.
     if (entry.json() == kChannels ||
         (entry.json().is_object() && entry.json().size() == 1 && entry["type"].json() == kChannels)) {

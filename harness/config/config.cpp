@@ -29,13 +29,13 @@ class PlanBuilder {
  public:
   explicit PlanBuilder(Plan& plan) : plan_(plan) {}
 
-  void add(const Draft& draft) {
-    Cell cell = draft.cell;
-    cell.estimator = *draft.estimator;
-    cell.medium = media_.index_of(plan_.media, *draft.medium);
-    plan_.media[cell.medium].optional &= draft.medium->optional;
-    cell.majorant = majorants_.index_of(plan_.majorants, *draft.majorant);
-    cell.rays = ray_sets_.index_of(plan_.ray_sets, *draft.rays);
+  void add(const ConfiguredCell& configured) {
+    Cell cell = configured.cell;
+    cell.estimator = *configured.estimator;
+    cell.medium = media_.index_of(plan_.media, *configured.medium);
+    plan_.media[cell.medium].optional &= configured.medium->optional;
+    cell.majorant = majorants_.index_of(plan_.majorants, *configured.majorant);
+    cell.rays = ray_sets_.index_of(plan_.ray_sets, *configured.rays);
     plan_.cells.push_back(std::move(cell));
   }
 
@@ -46,8 +46,8 @@ class PlanBuilder {
     template <class Spec>
     std::size_t index_of(std::vector<Spec>& list, const Spec& spec) {
       std::vector<std::size_t>& places = of_label_[spec.label];
-      for (const std::size_t place : places)
-        if (list[place] == spec) return place;
+      for (const std::size_t node : places)
+        if (list[node] == spec) return node;
       places.push_back(list.size());
       list.push_back(spec);
       return list.size() - 1;
@@ -61,46 +61,46 @@ class PlanBuilder {
   Index media_, majorants_, ray_sets_;
 };
 
-bool same_statistics(const Draft& a, const Draft& b) {
+bool same_statistics(const ConfiguredCell& a, const ConfiguredCell& b) {
   const auto agree = [&](const std::string& axis) { return agree_on(axis, a, b); };
   return a.cell.experiment == b.cell.experiment && std::all_of(axes().begin(), axes().end(), agree) &&
          a.cell.own_streams == b.cell.own_streams;
 }
 
-std::vector<std::uint64_t> read_batches(const Place& place) {
-  const auto one = [](const Place& number) { return number.unsigned_integer(1, 1u << 20); };
-  if (!place.json().is_array()) return {one(place)};
+std::vector<std::uint64_t> read_batches(const JsonNode& node) {
+  const auto one = [](const JsonNode& number) { return number.unsigned_integer(1, 1u << 20); };
+  if (!node.json().is_array()) return {one(node)};
   std::vector<std::uint64_t> batches;
-  for (const Place& element : place.elements()) {
+  for (const JsonNode& element : node.elements()) {
     batches.push_back(one(element));
     if (batches.size() > 1 && batches.back() <= batches[batches.size() - 2]) element.expected("more than the number before it");
   }
-  if (batches.empty()) place.expected("at least one number");
+  if (batches.empty()) node.expected("at least one number");
   return batches;
 }
 
-TimingPlan read_timing(const Place& place) {
-  place.expect_keys({"enabled", "repetitions", "seconds", "samples_per_traversal"});
+TimingPlan read_timing(const JsonNode& node) {
+  node.expect_keys({"enabled", "repetitions", "seconds", "samples_per_traversal"});
   TimingPlan timing;
-  if (place.has("enabled")) timing.enabled = place["enabled"].boolean();
-  if (place.has("repetitions")) timing.repetitions = static_cast<int>(place["repetitions"].integer(1, 10'000));
-  if (place.has("seconds")) timing.seconds = place["seconds"].positive();
-  if (place.has("samples_per_traversal")) timing.samples_per_traversal = read_batches(place["samples_per_traversal"]);
+  if (node.has("enabled")) timing.enabled = node["enabled"].boolean();
+  if (node.has("repetitions")) timing.repetitions = static_cast<int>(node["repetitions"].integer(1, 10'000));
+  if (node.has("seconds")) timing.seconds = node["seconds"].positive();
+  if (node.has("samples_per_traversal")) timing.samples_per_traversal = read_batches(node["samples_per_traversal"]);
   return timing;
 }
 
-Real read_level(const Place& place) {
-  const Real value = place.number();
-  if (!(value > 0 && value < 1)) place.expected("a number between 0 and 1");
+Real read_level(const JsonNode& node) {
+  const Real value = node.number();
+  if (!(value > 0 && value < 1)) node.expected("a number between 0 and 1");
   return value;
 }
 
-GateLevels read_levels(const Place& place) {
-  place.expect_keys({"alpha", "alpha_pass"});
-  GateLevels levels;
-  if (place.has("alpha")) levels.alpha = read_level(place["alpha"]);
-  if (place.has("alpha_pass")) levels.alpha_pass = read_level(place["alpha_pass"]);
-  return levels;
+ErrorRates read_error_rates(const JsonNode& node) {
+  node.expect_keys({"alpha", "alpha_pass"});
+  ErrorRates error_rates;
+  if (node.has("alpha")) error_rates.alpha = read_level(node["alpha"]);
+  if (node.has("alpha_pass")) error_rates.alpha_pass = read_level(node["alpha_pass"]);
+  return error_rates;
 }
 
 bool agree(const TimingPlan& a, const TimingPlan& b) {
@@ -112,8 +112,8 @@ bool agree(const TimingPlan& a, const TimingPlan& b) {
 struct DraftPlan {
   std::string file, name;
   TimingPlan timing;
-  GateLevels levels;
-  std::vector<Draft> cells;
+  ErrorRates error_rates;
+  std::vector<ConfiguredCell> cells;
   std::vector<std::string> experiments;
   Json json;  ///< for what refers to cells, which is read when they have names
   std::map<std::string, std::string> credits;
@@ -123,32 +123,36 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
   DraftPlan plan;
   plan.json = parse_json(source.text, source.file);
   const Json& json = plan.json;
-  const Place top(json, source.file);
-  if (json.is_object() && json.contains("nullmark_schema"))
+  const JsonNode top(json, source.file);
+  if (json.is_object() && json.contains("cells"))
     throw InputError(source.file + ": these are results; nullmark check, compare and report read them");
   top.expect_object();
-  if (json.empty() || json.begin().key() != "$schema")
-    top.fail(fmt::format("found {}; expected the first key \"$schema\": \"{}\"",
-                         json.empty() ? "an empty object" : "\"" + json.begin().key() + "\"", kConfigSchema));
-  if (top["$schema"].string() != kConfigSchema) top["$schema"].expected(fmt::format("\"{}\"", kConfigSchema));
-  top.expect_keys({"$schema", "name", "seed", "timing", "verdict", "experiments", "tables", "claims", "credits"});
+  if (json.contains("$schema") && json["$schema"] == "nullmark/config/1")
+    top["$schema"].fail(
+        fmt::format("found version 1; expected \"{}\": \"{}\", in which \"gate\" is called \"verdict\", and the top level's "
+                    "\"verdict\" \"error_rates\"",
+                    kVersionKey, kConfigVersion));
+  if (!json.contains(kVersionKey)) top.fail(fmt::format("expected the key \"{}\": \"{}\"", kVersionKey, kConfigVersion));
+  if (top[kVersionKey].string() != kConfigVersion) top[kVersionKey].expected(fmt::format("\"{}\"", kConfigVersion));
+  top.expect_keys(
+      {"$schema", kVersionKey, "name", "seed", "timing", "error_rates", "experiments", "tables", "claims", "credits"});
 
   plan.file = source.file;
   plan.name = top.has("name") ? top["name"].string() : std::filesystem::path(source.file).stem().string();
   if (top.has("timing")) plan.timing = read_timing(top["timing"]);
-  if (top.has("verdict")) plan.levels = read_levels(top["verdict"]);
+  if (top.has("error_rates")) plan.error_rates = read_error_rates(top["error_rates"]);
   std::uint64_t own_seed = 1;
   if (top.has("seed")) own_seed = top["seed"].unsigned_integer(0, std::numeric_limits<std::uint64_t>::max());
   std::vector<std::string>& experiments = plan.experiments;
   std::map<std::vector<std::string>, std::vector<std::size_t>> of_labels;
-  for (const Place& entry : top["experiments"].elements()) {
-    for (Draft& draft : read_experiment(entry, seed.value_or(own_seed))) {
-      std::vector<std::size_t>& alike = of_labels[{draft.cell.experiment, draft.estimator->label, draft.medium->label,
-                                                   draft.majorant->label, draft.rays->label}];
-      const auto same = [&](std::size_t other) { return same_statistics(draft, plan.cells[other]); };
+  for (const JsonNode& entry : top["experiments"].elements()) {
+    for (ConfiguredCell& configured : read_experiment(entry, seed.value_or(own_seed))) {
+      std::vector<std::size_t>& alike = of_labels[{configured.cell.experiment, configured.estimator->label,
+                                                   configured.medium->label, configured.majorant->label, configured.rays->label}];
+      const auto same = [&](std::size_t other) { return same_statistics(configured, plan.cells[other]); };
       if (std::any_of(alike.begin(), alike.end(), same)) continue;
       alike.push_back(plan.cells.size());
-      plan.cells.push_back(std::move(draft));
+      plan.cells.push_back(std::move(configured));
     }
     const std::string name = entry["name"].string();
     if (std::find(experiments.begin(), experiments.end(), name) != experiments.end())
@@ -167,11 +171,11 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
 void tell_experiments_apart(std::vector<DraftPlan>& files) {
   std::map<std::string, std::set<std::size_t>> owners;
   for (std::size_t i = 0; i < files.size(); ++i)
-    for (const Draft& draft : files[i].cells) owners[draft.cell.experiment].insert(i);
+    for (const ConfiguredCell& configured : files[i].cells) owners[configured.cell.experiment].insert(i);
   std::map<std::string, std::size_t> taken;
   for (std::size_t i = 0; i < files.size(); ++i)
-    for (Draft& draft : files[i].cells) {
-      std::string& name = draft.cell.experiment;
+    for (ConfiguredCell& configured : files[i].cells) {
+      std::string& name = configured.cell.experiment;
       if (owners[name].size() > 1) name = fmt::format("{}.{}", files[i].name, name);
       if (const auto [at, added] = taken.emplace(name, i); !added && at->second != i)
         throw InputError(
@@ -203,23 +207,23 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
 
   Plan plan;
   plan.timing = files.front().timing;
-  plan.levels = files.front().levels;
+  plan.error_rates = files.front().error_rates;
   plan.name = joint_name(files);
   PlanBuilder builder(plan);
   for (const DraftPlan& file : files) {
     if (!agree(file.timing, plan.timing))
       throw InputError(fmt::format("{}: /timing: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
-    if (!(file.levels == plan.levels))
+    if (!(file.error_rates == plan.error_rates))
       throw InputError(fmt::format("{}: /verdict: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
-    for (const Draft& draft : file.cells) builder.add(draft);
+    for (const ConfiguredCell& configured : file.cells) builder.add(configured);
     plan.credits.insert(file.credits.begin(), file.credits.end());
   }
   name_cells(plan);
   std::size_t first = 0;
   for (const DraftPlan& file : files) {
-    const Place top(file.json, file.file);
+    const JsonNode top(file.json, file.file);
     const CellPatterns finder(plan, first, file.cells, file.experiments);
     if (top.has("tables"))
       for (Table& table : read_tables(top["tables"], finder)) plan.tables.push_back(std::move(table));

@@ -14,8 +14,7 @@ namespace {
 
 /// A configuration of one experiment with the given keys beside a name, rays and sample count.
 std::string experiment(const std::string& keys) {
-  return R"({"$schema":"nullmark/config/1","name":"t","experiments":[{"name":"e","rays":"single","samples_per_ray":10,)" + keys +
-         "}]}";
+  return R"({"nullmark":"config/2","name":"t","experiments":[{"name":"e","rays":"single","samples_per_ray":10,)" + keys + "}]}";
 }
 
 Plan plan_of(const std::string& keys) { return read_config(experiment(keys), "t.json"); }
@@ -91,7 +90,7 @@ TEST(Config, ExcludeConstraintsAndInclude) {
 }
 
 TEST(Config, NamesAreUniqueAndSayWhatDiffers) {
-  const Plan plan = read_config(R"({"$schema":"nullmark/config/1","experiments":[
+  const Plan plan = read_config(R"({"nullmark":"config/2","experiments":[
     {"name":"a","rays":"single","samples_per_ray":10,"matrix":{"estimator":["ratio","delta"],"medium":"linear","seed":[1,2]}},
     {"name":"b","rays":"single","samples_per_ray":20,"matrix":{"estimator":["ratio"],"medium":"linear"}}]})",
                                 "t.json");
@@ -127,7 +126,7 @@ TEST(Config, IdsTellAllThatDecidesTheStatisticsAndNothingElse) {
 
 TEST(Config, AppliedConfigurationGivesTheSamePlan) {
   const Plan plan = read_config(
-      R"({"$schema":"nullmark/config/1","name":"round","seed":18446744073709551615,"timing":{"seconds":0.1},"experiments":[
+      R"({"nullmark":"config/2","name":"round","seed":18446744073709551615,"timing":{"seconds":0.1},"experiments":[
     {"name":"a","rays":{"type":"orthographic","width":4,"height":3},"equal_lookups":100.5,"images":true,"own_streams":true,
      "measurement":{"clamp":true,"quantise_bits":8},"matrix":{"estimator":["ratio",{"type":"residual_ratio","value":0.1}],
      "medium":[{"type":"linear","spectrum":[0.1,2],"optional":true},{"type":"channels","media":["linear","homogeneous"]}]}}],
@@ -154,7 +153,7 @@ TEST(Config, AppliedConfigurationGivesTheSamePlan) {
 TEST(Config, SeveralFilesKeepExperimentsApart) {
   const auto source = [](const std::string& name, const std::string& more = "") {
     return ConfigSource{
-        R"({"$schema":"nullmark/config/1","name":")" + name + "\"" + more +
+        R"({"nullmark":"config/2","name":")" + name + "\"" + more +
             R"(,"experiments":[{"name":"e","rays":"single","samples_per_ray":10,"matrix":{"estimator":"ratio","medium":"linear"}}],
         "tables":[{"title":"T","rows":[{"label":"R","cells":{"c":{"experiment":"e"}}}]}]})",
         name + ".json"};
@@ -173,7 +172,7 @@ TEST(Config, SeedOnTheCommandLineReplacesTheFilesOwn) {
 }
 
 TEST(Config, ErrorsAreOneLineWithPlaceAndRemedy) {
-  const std::string head = R"({"$schema":"nullmark/config/1",)";
+  const std::string head = R"({"nullmark":"config/2",)";
   const auto matrix = [](const std::string& estimator, const std::string& medium, const std::string& more = "") {
     return experiment(R"("matrix":{"estimator":)" + estimator + R"(,"medium":)" + medium + more + "}");
   };
@@ -208,11 +207,13 @@ TEST(Config, ErrorsAreOneLineWithPlaceAndRemedy) {
        R"(t.json: /experiments/0/samples_per_ray: found 0; expected a whole number from 1 to 9007199254740992)"},
       {head + R"("experiments":[{"name":"e","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":"linear"}}]})",
        R"(t.json: /experiments/0: "rays" is missing; expected it here or in "matrix")"},
-      {R"({"name":"x","$schema":"nullmark/config/1"})",
-       R"(t.json: /: found "name"; expected the first key "$schema": "nullmark/config/1")"},
-      {"{\"$schema\": \"nullmark/config/1\",\n  \"name\": \"a\",\n  \"na\\u006de\": \"b\"}",
+      {R"({"name":"x"})", R"(t.json: /: expected the key "nullmark": "config/2")"},
+      {R"({"nullmark":"config/3"})", R"(t.json: /nullmark: found "config/3"; expected "config/2")"},
+      {R"({"$schema":"nullmark/config/1"})",
+       R"(t.json: /$schema: found version 1; expected "nullmark": "config/2", in which "gate" is called "verdict", and the top level's "verdict" "error_rates")"},
+      {"{\"nullmark\": \"config/2\",\n  \"name\": \"a\",\n  \"na\\u006de\": \"b\"}",
        "t.json:3:3: key \"name\" occurs twice in this object"},
-      {"{\"$schema\": \"nullmark/config/1\",\n  \"seed\": 01}",
+      {"{\"nullmark\": \"config/2\",\n  \"seed\": 01}",
        "t.json:2:12: syntax error while parsing object - unexpected number literal; expected '}'"},
       {experiment(R"("matrix":{"estimator":"ratio","medium":"linear"},"exclude":[{"estimator":"ratio"}])"),
        R"(t.json: /experiments/0: found no cell after "exclude" and "constraints"; expected at least one)"}};
@@ -221,7 +222,7 @@ TEST(Config, ErrorsAreOneLineWithPlaceAndRemedy) {
 
 TEST(Config, SelectorsMatchExactlyOneCell) {
   const auto with_selector = [](const std::string& selector) {
-    return R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}],
+    return R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}],
       "tables":[{"title":"T","rows":[{"label":"R","cells":{"c":)" +
            selector + "}}]}]}";
   };

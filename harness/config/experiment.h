@@ -11,7 +11,7 @@
 namespace nullmark {
 
 /// A cell while its experiment is expanded: specifications in place of indices.
-struct Draft {
+struct ConfiguredCell {
   std::string experiment;  ///< as the file calls it
   std::optional<Component> estimator, rays;
   std::optional<MediumSpec> medium;
@@ -20,19 +20,19 @@ struct Draft {
   Cell cell;
 };
 
-/// Whether a pattern, a partial cell, fits a draft.
-using Test = std::function<bool(const Draft&)>;
+/// Whether a pattern, a partial cell, fits a configured.
+using Test = std::function<bool(const ConfiguredCell&)>;
 
 /// Keys by which cells of an experiment differ.
 const std::vector<std::string>& axes();
 
 /// A partial cell; all keys that are given must match.  Keys in `also` are someone else's.
-Test read_pattern(const Place& place, const std::vector<std::string>& also = {});
+Test read_pattern(const JsonNode& node, const std::vector<std::string>& also = {});
 
-/// Whether two drafts agree on an axis.
-bool agree_on(const std::string& axis, const Draft& a, const Draft& b);
+/// Whether two cells agree on an axis.
+bool agree_on(const std::string& axis, const ConfiguredCell& a, const ConfiguredCell& b);
 
 /// The cells of an experiment (format: config.md).  `seed` is that of cells that name none.
-std::vector<Draft> read_experiment(const Place& place, std::uint64_t seed);
+std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t seed);
 
 }  // namespace nullmark

@@ -127,7 +127,7 @@ Json definitions() {
   }
   cell["images"] = {{"type", "boolean"}, {"default", false}};
   cell["image_maximum"] = described(positive(), "value shown white");
-  cell["gate"] = described(
+  cell["verdict"] = described(
       closed_object(
           {{"enabled", {{"type", "boolean"}, {"default", true}}},
            {"epsilon", described(positive(), "|bias| that PASS excludes, relative to the mean reference")},
@@ -345,7 +345,8 @@ Json parameter_schema(const ParameterInfo& parameter) {
 Json config_schema() {
   Json json = {{"$schema", kDraft}, {"title", "nullmark configuration"}};
   json.update(closed_object(
-      {{"$schema", {{"const", kConfigSchema}}},
+      {{"$schema", {{"type", "string"}}},
+       {kVersionKey, {{"const", kConfigVersion}}},
        {"name", {{"type", "string"}}},
        {"seed", {{"type", "integer"}, {"minimum", 0}, {"default", 1}}},
        {"timing",
@@ -357,21 +358,22 @@ Json config_schema() {
               described({{"anyOf", {whole(1), list_of(whole(1), 1)}}},
                         "samples that share one walk through the majorant structure; of an ascending list the last is what a "
                         "cell's time says")}})},
-       {"verdict", closed_object({{"alpha", described(positive(), "chance of even one false FAIL in the whole configuration")},
-                                  {"alpha_pass", described(positive(), "chance of a false PASS, of each test")}})},
+       {"error_rates",
+        closed_object({{"alpha", described(positive(), "chance of even one false FAIL in the whole configuration")},
+                       {"alpha_pass", described(positive(), "chance of a false PASS, of each test")}})},
        {"experiments", list_of(reference("experiment"), 1)},
        {"tables", list_of(reference("table"))},
        {"claims", list_of(reference("claim"))},
        {"credits", described({{"type", "object"}, {"additionalProperties", {{"type", "string"}}}},
                              "author and licence, by a data file's name")}},
-      {"$schema", "experiments"}));
+      {kVersionKey, "experiments"}));
   json["definitions"] = definitions();
   return json;
 }
 
 Json results_schema() {
   Json json = {{"$schema", kDraft}, {"title", "nullmark results"}};
-  json.update(object_schema({{"nullmark_schema", {{"const", RunRecord::kSchema}}},
+  json.update(object_schema({{kVersionKey, {{"const", RunRecord::kVersion}}},
                              {"name", {{"type", "string"}}},
                              {"config_hash", {{"type", "string"}}},
                              {"config", {{"type", {"object", "null"}}, {"description", "as applied: every cell is named"}}},
@@ -379,7 +381,7 @@ Json results_schema() {
                              {"cells", list_of(cell_schema())},
                              {"tables", list_of({{"type", "object"}})},
                              {"claims", list_of({{"type", "object"}})}},
-                            {"nullmark_schema", "name", "config", "provenance", "cells"}));
+                            {kVersionKey, "name", "config", "provenance", "cells"}));
   return json;
 }
 

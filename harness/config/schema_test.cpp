@@ -54,7 +54,7 @@ TEST(Schema, AcceptsTheConfigurationsOfTheTree) {
 TEST(Schema, RefusesWhatTheReaderRefuses) {
   const Checker check(config_schema());
   const auto experiment = [](const std::string& keys) {
-    return R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,)" + keys + "}]}";
+    return R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,)" + keys + "}]}";
   };
   const std::string good = R"("matrix":{"estimator":"ratio","medium":"linear"})";
   EXPECT_EQ(check(experiment(good)), "");

@@ -14,13 +14,13 @@ class CellReader {
   virtual ~CellReader() = default;
 
   /// Throws InputError where not exactly one fits.
-  virtual std::string one(const Place& place) const;
+  virtual std::string one(const JsonNode& node) const;
 
   /// All that fit, in the order of the configuration; of a list of references one after the other.  Throws InputError for none.
-  virtual std::vector<std::string> all(const Place& place) const;
+  virtual std::vector<std::string> all(const JsonNode& node) const;
 
   /// For each cell that `of` refers to, the one that `place` pairs with it.  Throws InputError where there is not exactly one.
-  virtual std::vector<std::string> counterparts(const Place& of, const Place& place) const;
+  virtual std::vector<std::string> counterparts(const JsonNode& of, const JsonNode& node) const;
 
   /// Whether the cell of a name gets a verdict; true where only results know.
   virtual bool is_judged(const std::string& name) const;

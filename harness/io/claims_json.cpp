@@ -25,68 +25,67 @@ Json compared_with(const ClaimPart& part) {
   return part.others.empty() ? Json(part.numbers) : names_json(part.others);
 }
 
-void read_compared_with(const Place& part, const Place& place, const CellReader& finder, ClaimPart& out) {
-  if (place.json() == "theory" && out.slope_against.empty()) {
+void read_compared_with(const JsonNode& part, const JsonNode& node, const CellReader& finder, ClaimPart& out) {
+  if (node.json() == "theory" && out.slope_against.empty()) {
     out.theory = true;
     return;
   }
-  const bool number =
-      place.json().is_number() || (place.json().is_array() && !place.json().empty() && place[0].json().is_number());
-  if (!number && !out.slope_against.empty()) place.expected("a number, which the slope is compared with");
-  if (place.json().is_string())
-    place.fail(
-        fmt::format("found {}; expected a number, one for each cell, \"theory\" or a pattern of cells", place.json().dump()));
+  const bool number = node.json().is_number() || (node.json().is_array() && !node.json().empty() && node[0].json().is_number());
+  if (!number && !out.slope_against.empty()) node.expected("a number, which the slope is compared with");
+  if (node.json().is_string())
+    node.fail(
+        fmt::format("found {}; expected a number, one for each cell, \"theory\" or a pattern of cells", node.json().dump()));
   if (number)
-    for (const Place& value : place.elements_or_self()) out.numbers.push_back(value.number());
+    for (const JsonNode& value : node.elements_or_self()) out.numbers.push_back(value.number());
   else
-    out.others = finder.counterparts(part["cells"], place);
+    out.others = finder.counterparts(part["cells"], node);
   const std::size_t count = std::max(out.numbers.size(), out.others.size());
   const std::size_t wanted = out.slope_against.empty() ? out.cells.size() : 1;
   if (count != wanted && !(number && count == 1))
-    place.fail(fmt::format("found {} to compare with; expected {}, one for each of \"cells\"", count, wanted));
+    node.fail(fmt::format("found {} to compare with; expected {}, one for each of \"cells\"", count, wanted));
   for (std::size_t i = 0; i < out.others.size(); ++i)
     if (out.others[i] == out.cells[i])
-      place.fail(fmt::format("\"{}\" would be compared with itself; expected another cell", out.cells[i]));
+      node.fail(fmt::format("\"{}\" would be compared with itself; expected another cell", out.cells[i]));
 }
 
-ClaimPart read_part(const Place& place, const CellReader& finder) {
+ClaimPart read_part(const JsonNode& node, const CellReader& finder) {
   std::vector<std::string> keys = {"says", "metric", "cells", "factor", "tolerance", "slope_against"};
   keys.insert(keys.end(), kRelations.begin(), kRelations.end());
-  place.expect_keys(keys);
+  node.expect_keys(keys);
   ClaimPart part;
-  if (place.has("says")) part.says = place["says"].string();
-  part.cells = finder.all(place["cells"]);
-  if (place.has("slope_against")) {
-    part.slope_against = place["slope_against"].one_of(metric_names(), "metric");
+  if (node.has("says")) part.says = node["says"].string();
+  part.cells = finder.all(node["cells"]);
+  if (node.has("slope_against")) {
+    part.slope_against = node["slope_against"].one_of(metric_names(), "metric");
     if (part.cells.size() < 3)
-      place["cells"].fail(
+      node["cells"].fail(
           fmt::format("matches {} cells; expected three or more, through which a slope has an error", part.cells.size()));
   }
-  if (place.has("factor")) part.factor = place["factor"].number();
-  if (place.has("tolerance")) part.tolerance = place["tolerance"].positive();
+  if (node.has("factor")) part.factor = node["factor"].number();
+  if (node.has("tolerance")) part.tolerance = node["tolerance"].positive();
 
-  const auto given = [&](const std::string& relation) { return place.has(relation.c_str()); };
+  const auto given = [&](const std::string& relation) { return node.has(relation.c_str()); };
   if (std::count_if(kRelations.begin(), kRelations.end(), given) != 1)
-    place.fail("expected exactly one of \"near\", \"at_most\", \"at_least\" and \"unbiased\"");
+    node.fail("expected exactly one of \"near\", \"at_most\", \"at_least\" and \"unbiased\"");
   const auto relation = std::find_if(kRelations.begin(), kRelations.end(), given);
   part.relation = static_cast<Relation>(relation - kRelations.begin());
   if (part.relation == Relation::unbiased) {
-    if (!place["unbiased"].boolean()) place["unbiased"].expected("true");
+    if (!node["unbiased"].boolean()) node["unbiased"].expected("true");
     for (const char* other : {"metric", "factor", "tolerance", "slope_against"})
-      if (place.has(other)) place[other].fail("does not apply to \"unbiased\"");
+      if (node.has(other)) node[other].fail("does not apply to \"unbiased\"");
     for (const std::string& cell : part.cells)
       if (!finder.is_judged(cell))
-        place["cells"].fail(fmt::format("\"{}\" gets no verdict; expected its \"gate\" to be enabled", cell));
+        node["cells"].fail(fmt::format("\"{}\" gets no verdict; expected its \"verdict\" to be enabled", cell));
     return part;
   }
-  part.metric = place["metric"].one_of(metric_names(), "metric");
+  part.metric = node["metric"].one_of(metric_names(), "metric");
   const std::vector<std::string>& claimable = claimable_metric_names();
   if (std::find(claimable.begin(), claimable.end(), part.metric) == claimable.end())
-    place["metric"].fail(fmt::format("\"{}\" has no standard error, so that nothing could be told; expected one of {}",
-                                     part.metric, fmt::join(claimable, ", ")));
-  if (place.has("tolerance") != (part.relation == Relation::near))
-    place.fail("expected \"tolerance\" beside \"near\", and only there");
-  read_compared_with(place, place[*relation], finder, part);
+    node["metric"].fail(fmt::format("\"{}\" has no standard error, so that nothing could be told; expected one of {}",
+                                    part.metric, fmt::join(claimable, ", ")));
+  if (node.has("tolerance") != (part.relation == Relation::near))
+    node.fail("expected \"tolerance\" beside \"near\", and only there");
+  read_compared_with(node, node[*relation], finder, part);
   return part;
 }
 
@@ -115,16 +114,16 @@ Json claims_json(const std::vector<PublishedClaim>& claims) {
   return list;
 }
 
-void read_claims(const Place& place, const CellReader& finder, std::vector<PublishedClaim>& claims) {
+void read_claims(const JsonNode& node, const CellReader& finder, std::vector<PublishedClaim>& claims) {
   std::set<std::string> ids;
   for (const PublishedClaim& earlier : claims) ids.insert(earlier.id);
-  for (const Place& entry : place.elements()) {
+  for (const JsonNode& entry : node.elements()) {
     entry.expect_keys({"id", "source", "claim", "note", "parts"});
     PublishedClaim claim{entry["id"].string(), entry["source"].string(), entry["claim"].string(), "", {}};
     if (entry.has("note")) claim.note = entry["note"].string();
     if (!ids.insert(claim.id).second)
       entry["id"].fail(fmt::format("\"{}\" is the id of an earlier claim; expected another", claim.id));
-    for (const Place& part : entry["parts"].elements()) claim.parts.push_back(read_part(part, finder));
+    for (const JsonNode& part : entry["parts"].elements()) claim.parts.push_back(read_part(part, finder));
     if (claim.parts.empty()) entry["parts"].expected("at least one comparison");
     claims.push_back(std::move(claim));
   }

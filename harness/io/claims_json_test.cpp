@@ -9,12 +9,12 @@ namespace nullmark {
 namespace {
 
 std::string config(const std::string& claims) {
-  return R"({"$schema":"nullmark/config/1","name":"t","experiments":[
+  return R"({"nullmark":"config/2","name":"t","experiments":[
     {"name":"e","rays":"single","samples_per_ray":10,
      "matrix":{"estimator":["ratio","delta",{"type":"residual_ratio","control":["minimum","average"],"rate_scale":[1,2]}],
                "medium":["linear","cosine"]}},
     {"name":"f","rays":"single","samples_per_ray":10,"matrix":{"estimator":["ratio","delta"],"medium":"linear"}},
-    {"name":"unjudged","rays":"single","samples_per_ray":10,"gate":{"enabled":false},"estimator":"ratio","include":[{"medium":"linear"}]}],
+    {"name":"unjudged","rays":"single","samples_per_ray":10,"verdict":{"enabled":false},"estimator":"ratio","include":[{"medium":"linear"}]}],
     "claims":[)" +
          claims + "]}";
 }
@@ -89,8 +89,9 @@ TEST(Claims, WhatIsWrongIsNamedWithItsPlace) {
   EXPECT_NE(slope("e", R"({"estimator":"delta"})").find("expected a number"), std::string::npos);
   EXPECT_NE(slope("f", "1").find("matches 2 cells; expected three or more"), std::string::npos);
   says(R"(,"unbiased":false)", "expected true");
-  EXPECT_NE(error_of(claim(R"({"cells":{"experiment":"unjudged"},"unbiased":true})")).find("expected its \"gate\" to be enabled"),
-            std::string::npos);
+  EXPECT_NE(
+      error_of(claim(R"({"cells":{"experiment":"unjudged"},"unbiased":true})")).find("expected its \"verdict\" to be enabled"),
+      std::string::npos);
   EXPECT_NE(error_of(claim(R"({"metric":"mean","cells":{"experiment":"f","medium":"cosine"},"at_most":1})"))
                 .find("none of this \"medium\""),
             std::string::npos);

@@ -152,63 +152,67 @@ std::string nearest(std::string_view word, const std::vector<std::string>& candi
   return best;
 }
 
-Place Place::operator[](const std::string& key) const {
+JsonNode JsonNode::operator[](const std::string& key) const {
   const auto at = value_->find(key);
   if (at == value_->end()) fail(fmt::format("\"{}\" is missing", key));
   return {*at, file_, pointer_ + "/" + escaped(key)};
 }
 
-Place Place::operator[](std::size_t index) const { return {(*value_)[index], file_, fmt::format("{}/{}", pointer_, index)}; }
+JsonNode JsonNode::operator[](std::size_t index) const {
+  return {(*value_)[index], file_, fmt::format("{}/{}", pointer_, index)};
+}
 
-std::vector<Place> Place::elements() const {
+std::vector<JsonNode> JsonNode::elements() const {
   if (!value_->is_array()) expected("a list");
-  std::vector<Place> result;
+  std::vector<JsonNode> result;
   for (std::size_t i = 0; i < value_->size(); ++i) result.push_back((*this)[i]);
   return result;
 }
 
-std::vector<Place> Place::elements_or_self() const { return value_->is_array() ? elements() : std::vector<Place>{*this}; }
+std::vector<JsonNode> JsonNode::elements_or_self() const {
+  return value_->is_array() ? elements() : std::vector<JsonNode>{*this};
+}
 
-void Place::expect_object() const {
+void JsonNode::expect_object() const {
   if (!value_->is_object()) expected("an object");
 }
 
-void Place::expect_keys(const std::vector<std::string>& allowed) const {
+void JsonNode::expect_keys(const std::vector<std::string>& allowed) const {
   expect_object();
   for (const auto& [key, value] : value_->items())
     if (key.rfind("x-", 0) != 0 && std::find(allowed.begin(), allowed.end(), key) == allowed.end())
       (*this)[key].unknown("key", key, allowed);
 }
 
-bool Place::boolean() const {
+bool JsonNode::boolean() const {
   if (!value_->is_boolean()) expected("true or false");
   return value_->get<bool>();
 }
 
-std::string Place::string() const {
+std::string JsonNode::string() const {
   if (!value_->is_string()) expected("a string");
   return value_->get<std::string>();
 }
 
-std::string Place::one_of(const std::vector<std::string>& names, const char* what) const {
+std::string JsonNode::one_of(const std::vector<std::string>& names, const char* what) const {
   if (!value_->is_string()) expected(fmt::format("one of \"{}\"", fmt::join(names, "\", \"")));
   std::string name = value_->get<std::string>();
   if (std::find(names.begin(), names.end(), name) == names.end()) unknown(what, name, names);
   return name;
 }
 
-Real Place::number() const {
+Real JsonNode::number() const {
   if (!value_->is_number()) expected("a number");
   return value_->get<Real>();
 }
 
-Real Place::positive() const {
+Real JsonNode::positive() const {
   const Real value = number();
   if (!(value > 0) || !std::isfinite(value)) expected("a finite number > 0");
   return value;
 }
 
-std::uint64_t Place::unsigned_integer(std::uint64_t low, std::uint64_t high) const {
+std::uint64_t JsonNode::unsigned_integer(std::uint64_t low, std::uint64_t high) const {
   const std::string expectation = high == std::numeric_limits<std::uint64_t>::max()
                                       ? fmt::format("a whole number >= {}", low)
                                       : fmt::format("a whole number from {} to {}", low, high);
@@ -226,7 +230,7 @@ std::uint64_t Place::unsigned_integer(std::uint64_t low, std::uint64_t high) con
   return result;
 }
 
-std::int64_t Place::integer(std::int64_t low, std::int64_t high) const {
+std::int64_t JsonNode::integer(std::int64_t low, std::int64_t high) const {
   const std::string expectation = fmt::format("a whole number from {} to {}", low, high);
   if (!value_->is_number()) expected(expectation);
   const Real real = value_->get<Real>();
@@ -234,13 +238,13 @@ std::int64_t Place::integer(std::int64_t low, std::int64_t high) const {
   return static_cast<std::int64_t>(real);
 }
 
-void Place::fail(const std::string& message) const { throw InputError(where() + ": " + message); }
+void JsonNode::fail(const std::string& message) const { throw InputError(where() + ": " + message); }
 
-void Place::expected(const std::string& expectation) const {
+void JsonNode::expected(const std::string& expectation) const {
   fail(fmt::format("found {}; expected {}", shown(*value_), expectation));
 }
 
-void Place::unknown(const std::string& what, const std::string& name, const std::vector<std::string>& known) const {
+void JsonNode::unknown(const std::string& what, const std::string& name, const std::vector<std::string>& known) const {
   const std::string near = nearest(name, known);
   fail(fmt::format("unknown {} \"{}\"; {}", what, name,
                    near.empty() ? fmt::format("expected one of \"{}\"", fmt::join(known, "\", \""))

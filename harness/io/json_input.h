@@ -39,9 +39,9 @@ std::string nearest(std::string_view word, const std::vector<std::string>& candi
 
 /// A value in a JSON document and where it stands; its getters throw InputError with file and JSON pointer where it is not what
 /// is asked for.
-class Place {
+class JsonNode {
  public:
-  Place(const Json& value, std::string file, std::string pointer = "")
+  JsonNode(const Json& value, std::string file, std::string pointer = "")
       : value_(&value), file_(std::move(file)), pointer_(std::move(pointer)) {}
 
   const Json& json() const { return *value_; }
@@ -51,12 +51,12 @@ class Place {
   std::string where() const { return file_ + ": " + pointer(); }
 
   bool has(const char* key) const { return value_->contains(key); }
-  Place operator[](const std::string& key) const;
-  Place operator[](std::size_t index) const;
+  JsonNode operator[](const std::string& key) const;
+  JsonNode operator[](std::size_t index) const;
   /// The elements of a list.
-  std::vector<Place> elements() const;
+  std::vector<JsonNode> elements() const;
   /// The list's elements, or the value itself where it is no list.
-  std::vector<Place> elements_or_self() const;
+  std::vector<JsonNode> elements_or_self() const;
 
   void expect_object() const;
   /// Also refuses every key that is neither allowed nor begins with "x-".

@@ -12,7 +12,7 @@ Json cell_json(const CellRecord& record);
 
 /// The inverse: complete but for the cell's indices into its plan's lists, which are 0; the record holds what they referred to.
 /// Numbers come back bit for bit.  Throws InputError.
-CellRecord read_cell(const Place& place);
+CellRecord read_cell(const JsonNode& node);
 
 /// The results file, one cell a line.
 std::string results_text(const RunRecord& run);

@@ -125,8 +125,10 @@ TEST(ResultsJson, StatisticsLeaveOutTimeProvenanceAndPaths) {
 TEST(ResultsJson, ErrorsAreOneLine) {
   const std::string text = results_text(example_results());
   EXPECT_EQ(error_of(text), "no error");
-  EXPECT_EQ(error_of(replaced(text, "\"nullmark_schema\": 1", "\"nullmark_schema\": 2")),
-            "r.json: /nullmark_schema: found 2; expected 1, the schema this program reads");
+  EXPECT_EQ(error_of(replaced(text, "results/2", "results/3")),
+            "r.json: /nullmark: found \"results/3\"; expected \"results/2\", the version this program reads");
+  EXPECT_EQ(error_of(R"({"nullmark_schema": 1, "name": "old"})"),
+            "r.json: are results of version 1; this program reads \"nullmark\": \"results/2\": run their configuration again");
   EXPECT_EQ(error_of("{}"), "r.json: is no results file of nullmark; `nullmark run` writes them");
   EXPECT_EQ(error_of(replaced(text, "\"status\":\"ok\"", "\"status\":\"okay\"")),
             "r.json: /cells/0/status: unknown status \"okay\"; expected one of \"ok\", \"skipped\", \"not_run\", \"error\"");

@@ -89,13 +89,13 @@ const std::vector<std::string>& sample_policies() {
   return kNames;
 }
 
-Json gate_json(const GateSpec& gate) {
-  Json json = {{"enabled", gate.enabled}, {"max_samples_per_ray", gate.max_samples_per_ray}};
-  json["laws"] = law_policies()[static_cast<std::size_t>(gate.laws)];
-  if (gate.tolerate != Tolerate::nothing) json["tolerate"] = tolerances()[static_cast<std::size_t>(gate.tolerate)];
-  if (gate.all_samples) json["samples"] = sample_policies()[1];
-  if (gate.epsilon) json["epsilon"] = *gate.epsilon;
-  if (gate.max_lookups_per_ray) json["max_lookups_per_ray"] = *gate.max_lookups_per_ray;
+Json verdict_spec_json(const VerdictSpec& spec) {
+  Json json = {{"enabled", spec.enabled}, {"max_samples_per_ray", spec.max_samples_per_ray}};
+  json["laws"] = law_policies()[static_cast<std::size_t>(spec.laws)];
+  if (spec.tolerate != Tolerate::nothing) json["tolerate"] = tolerances()[static_cast<std::size_t>(spec.tolerate)];
+  if (spec.all_samples) json["samples"] = sample_policies()[1];
+  if (spec.epsilon) json["epsilon"] = *spec.epsilon;
+  if (spec.max_lookups_per_ray) json["max_lookups_per_ray"] = *spec.max_lookups_per_ray;
   return json;
 }
 
@@ -110,19 +110,19 @@ std::string applied_config(const Plan& plan) {
     if (plan.media[cell.medium].optional) entry["medium"]["optional"] = true;
     entry["images"] = cell.images;
     entry["image_maximum"] = cell.image_maximum;
-    entry["gate"] = gate_json(cell.gate);
+    entry["verdict"] = verdict_spec_json(cell.verdict);
     if (cell.reference) entry["reference"] = reference_json(*cell.reference);
     experiments.back()["include"].push_back(std::move(entry));
   }
   const std::vector<std::uint64_t>& batches = plan.timing.samples_per_traversal;
-  Json json = {{"$schema", kConfigSchema},
+  Json json = {{kVersionKey, kConfigVersion},
                {"name", plan.name},
                {"timing",
                 {{"enabled", plan.timing.enabled},
                  {"repetitions", plan.timing.repetitions},
                  {"seconds", plan.timing.seconds},
                  {"samples_per_traversal", batches.size() == 1 ? Json(batches[0]) : Json(batches)}}},
-               {"verdict", {{"alpha", plan.levels.alpha}, {"alpha_pass", plan.levels.alpha_pass}}},
+               {"error_rates", {{"alpha", plan.error_rates.alpha}, {"alpha_pass", plan.error_rates.alpha_pass}}},
                {"experiments", std::move(experiments)},
                {"tables", tables_json(plan.tables)}};
   if (!plan.claims.empty()) json["claims"] = claims_json(plan.claims);

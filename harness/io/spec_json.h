@@ -8,7 +8,8 @@
 
 namespace nullmark {
 
-inline constexpr const char* kConfigSchema = "nullmark/config/1";
+/// The first key of a configuration.
+inline constexpr const char *kVersionKey = "nullmark", *kConfigVersion = "config/2";
 
 /// Parts of a plan as a configuration writes them, complete: every parameter stands there.
 Json parameters_json(const ParameterValues& values);
@@ -22,7 +23,7 @@ Json measurement_json(const Measurement& measurement);
 const std::vector<std::string>& law_policies();
 const std::vector<std::string>& tolerances();
 const std::vector<std::string>& sample_policies();
-Json gate_json(const GateSpec& gate);
+Json verdict_spec_json(const VerdictSpec& spec);
 
 /// What decides a cell's statistics, as canonical text, hashed to 16 hexadecimal digits.
 std::string cell_id(const Plan& plan, const Cell& cell);

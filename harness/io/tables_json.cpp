@@ -25,41 +25,41 @@ Json tables_json(const std::vector<Table>& tables) {
 
 namespace {
 
-TableRow read_row(const Place& place, const CellReader& finder) {
-  place.expect_keys({"label", "given", "cells", "theory", "note", "relative_to", "tolerance"});
+TableRow read_row(const JsonNode& node, const CellReader& finder) {
+  node.expect_keys({"label", "given", "cells", "theory", "note", "relative_to", "tolerance"});
   TableRow row;
-  row.label = place["label"].string();
-  if (place.has("note")) row.note = place["note"].string();
-  if (place.has("given")) {
-    place["given"].expect_object();
-    for (const auto& [heading, json] : place["given"].json().items())
-      row.given.emplace_back(heading, place["given"][heading].number());
+  row.label = node["label"].string();
+  if (node.has("note")) row.note = node["note"].string();
+  if (node.has("given")) {
+    node["given"].expect_object();
+    for (const auto& [heading, json] : node["given"].json().items())
+      row.given.emplace_back(heading, node["given"][heading].number());
   }
-  if (place.has("cells")) {
-    place["cells"].expect_object();
-    for (const auto& [heading, json] : place["cells"].json().items())
-      row.cells.emplace_back(heading, finder.one(place["cells"][heading]));
+  if (node.has("cells")) {
+    node["cells"].expect_object();
+    for (const auto& [heading, json] : node["cells"].json().items())
+      row.cells.emplace_back(heading, finder.one(node["cells"][heading]));
   }
-  if (place.has("theory")) row.theory_of = finder.one(place["theory"]);
-  if (place.has("relative_to")) row.relative_to = finder.one(place["relative_to"]);
-  if (place.has("tolerance")) {
-    row.tolerance = place["tolerance"].positive();
+  if (node.has("theory")) row.theory_of = finder.one(node["theory"]);
+  if (node.has("relative_to")) row.relative_to = finder.one(node["relative_to"]);
+  if (node.has("tolerance")) {
+    row.tolerance = node["tolerance"].positive();
     if (row.given.empty() || row.cells.empty())
-      place["tolerance"].fail("needs \"given\" and \"cells\" beside it, which it compares");
+      node["tolerance"].fail("needs \"given\" and \"cells\" beside it, which it compares");
   }
   return row;
 }
 
 }  // namespace
 
-std::vector<Table> read_tables(const Place& place, const CellReader& finder) {
+std::vector<Table> read_tables(const JsonNode& node, const CellReader& finder) {
   std::vector<Table> tables;
-  for (const Place& entry : place.elements()) {
+  for (const JsonNode& entry : node.elements()) {
     entry.expect_keys({"title", "metric", "rows"});
     Table table;
     table.title = entry["title"].string();
     if (entry.has("metric")) table.metric = entry["metric"].one_of(metric_names(), "metric");
-    for (const Place& row : entry["rows"].elements()) table.rows.push_back(read_row(row, finder));
+    for (const JsonNode& row : entry["rows"].elements()) table.rows.push_back(read_row(row, finder));
     tables.push_back(std::move(table));
   }
   return tables;

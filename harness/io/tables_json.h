@@ -9,6 +9,6 @@ namespace nullmark {
 Json tables_json(const std::vector<Table>& tables);
 
 /// Tables of a configuration or, with a finder that takes names as they are, of results.  Throws InputError.
-std::vector<Table> read_tables(const Place& place, const CellReader& finder);
+std::vector<Table> read_tables(const JsonNode& node, const CellReader& finder);
 
 }  // namespace nullmark

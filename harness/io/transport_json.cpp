@@ -12,9 +12,9 @@ namespace {
 const std::vector<std::string> kShapes = {"plane", "box", "sphere"}, kNextEvent = {"off", "phase", "uniform"},
                                kKernels = {"own", "general"};
 
-std::array<Real, 3> read_point(const Place& place) {
-  if (!place.json().is_array() || place.json().size() != 3) place.expected("a list of 3 numbers");
-  return {place[std::size_t{0}].number(), place[1].number(), place[2].number()};
+std::array<Real, 3> read_point(const JsonNode& node) {
+  if (!node.json().is_array() || node.json().size() != 3) node.expected("a list of 3 numbers");
+  return {node[std::size_t{0}].number(), node[1].number(), node[2].number()};
 }
 
 /// The keys of a shape's two points.
@@ -23,23 +23,23 @@ std::pair<const char*, const char*> point_keys(const std::string& type) {
   return type == "sphere" ? std::pair{"center", "radius"} : std::pair{"point", "normal"};
 }
 
-SurfaceSpec read_surface(const Place& place) {
-  place.expect_object();
+SurfaceSpec read_surface(const JsonNode& node) {
+  node.expect_object();
   SurfaceSpec surface;
-  surface.type = place["type"].one_of(kShapes, "surface");
+  surface.type = node["type"].one_of(kShapes, "surface");
   const auto [first, second] = point_keys(surface.type);
-  place.expect_keys({"type", first, second, "radiance"});
-  surface.point = read_point(place[first]);
+  node.expect_keys({"type", first, second, "radiance"});
+  surface.point = read_point(node[first]);
   if (surface.type == "sphere") {
-    surface.radius = place["radius"].number();
-    if (!(surface.radius > 0)) place["radius"].expected("a radius above 0");
+    surface.radius = node["radius"].number();
+    if (!(surface.radius > 0)) node["radius"].expected("a radius above 0");
   } else {
-    surface.direction = read_point(place[second]);
+    surface.direction = read_point(node[second]);
   }
-  if (surface.type == "plane" && surface.direction == std::array<Real, 3>{}) place["normal"].expected("a normal that is not 0");
+  if (surface.type == "plane" && surface.direction == std::array<Real, 3>{}) node["normal"].expected("a normal that is not 0");
   for (std::size_t axis = 0; axis < 3 && surface.type == "box"; ++axis)
-    if (!(surface.point[axis] < surface.direction[axis])) place["high"].expected("a corner above \"low\" along every axis");
-  if (place.has("radiance")) surface.radiance = read_per_channel(place["radiance"], kInfinity);
+    if (!(surface.point[axis] < surface.direction[axis])) node["high"].expected("a corner above \"low\" along every axis");
+  if (node.has("radiance")) surface.radiance = read_per_channel(node["radiance"], kInfinity);
   return surface;
 }
 
@@ -56,37 +56,37 @@ Json surface_json(const SurfaceSpec& surface) {
 
 }  // namespace
 
-std::vector<Real> read_per_channel(const Place& place, Real most) {
+std::vector<Real> read_per_channel(const JsonNode& node, Real most) {
   std::vector<Real> values;
-  for (const Place& element : place.elements_or_self()) {
+  for (const JsonNode& element : node.elements_or_self()) {
     const Real value = element.number();
     if (!(value >= 0 && value <= most) || !std::isfinite(value))
       element.expected(std::isfinite(most) ? fmt::format("a number from 0 to {}", most) : "a finite number >= 0");
     values.push_back(value);
   }
-  if (values.size() > kMaxChannels) place.expected(fmt::format("one number, or one per channel, at most {}", kMaxChannels));
+  if (values.size() > kMaxChannels) node.expected(fmt::format("one number, or one per channel, at most {}", kMaxChannels));
   return values;
 }
 
-TransportSpec read_transport(const Place& place) {
-  place.expect_keys({"environment", "surfaces", "next_event", "roulette_from", "roulette_floor", "most_scatterings", "kernel"});
+TransportSpec read_transport(const JsonNode& node) {
+  node.expect_keys({"environment", "surfaces", "next_event", "roulette_from", "roulette_floor", "most_scatterings", "kernel"});
   TransportSpec transport;
-  if (place.has("environment")) transport.environment = read_per_channel(place["environment"], kInfinity);
-  if (place.has("surfaces"))
-    for (const Place& surface : place["surfaces"].elements()) transport.surfaces.push_back(read_surface(surface));
-  if (place.has("next_event")) transport.next_event = place["next_event"].one_of(kNextEvent, "next_event");
+  if (node.has("environment")) transport.environment = read_per_channel(node["environment"], kInfinity);
+  if (node.has("surfaces"))
+    for (const JsonNode& surface : node["surfaces"].elements()) transport.surfaces.push_back(read_surface(surface));
+  if (node.has("next_event")) transport.next_event = node["next_event"].one_of(kNextEvent, "next_event");
   const auto count = [&](const char* key, std::optional<int>& value) {
-    if (!place.has(key)) return;
+    if (!node.has(key)) return;
     value.reset();
-    if (!place[key].json().is_null()) value = static_cast<int>(place[key].integer(0, 1'000'000));
+    if (!node[key].json().is_null()) value = static_cast<int>(node[key].integer(0, 1'000'000));
   };
   count("roulette_from", transport.roulette_from);
   count("most_scatterings", transport.most_scatterings);
-  if (place.has("roulette_floor")) {
-    transport.roulette_floor = place["roulette_floor"].number();
-    if (!(transport.roulette_floor > 0 && transport.roulette_floor <= 1)) place["roulette_floor"].expected("a number in (0, 1]");
+  if (node.has("roulette_floor")) {
+    transport.roulette_floor = node["roulette_floor"].number();
+    if (!(transport.roulette_floor > 0 && transport.roulette_floor <= 1)) node["roulette_floor"].expected("a number in (0, 1]");
   }
-  if (place.has("kernel")) transport.general = place["kernel"].one_of(kKernels, "kernel") == "general";
+  if (node.has("kernel")) transport.general = node["kernel"].one_of(kKernels, "kernel") == "general";
   return transport;
 }
 

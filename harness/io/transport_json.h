@@ -9,7 +9,7 @@ namespace nullmark {
 
 /// {"environment": 1, "surfaces": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "radiance": 2}], "next_event": "phase",
 /// "roulette_from": null, "roulette_floor": 0.05, "most_scatterings": 1, "kernel": "general"}; every key may be left out.
-TransportSpec read_transport(const Place& place);
+TransportSpec read_transport(const JsonNode& node);
 
 /// The inverse, complete.
 Json transport_json(const TransportSpec& transport);
@@ -18,7 +18,7 @@ Json transport_json(const TransportSpec& transport);
 std::string transport_label(const TransportSpec& transport);
 
 /// One number, or a list of one per channel, each >= 0 and at most `most`.
-std::vector<Real> read_per_channel(const Place& place, Real most);
+std::vector<Real> read_per_channel(const JsonNode& node, Real most);
 
 Json transport_schema();
 

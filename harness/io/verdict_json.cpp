@@ -18,15 +18,14 @@ const std::vector<std::string> kBases = {"betting", "catoni", "catoni+betting", 
 
 Json outcome_json(Outcome outcome) { return outcome == Outcome::none ? Json(nullptr) : Json(to_string(outcome)); }
 
-Outcome read_outcome(const Place& place) {
-  if (place.json().is_null()) return Outcome::none;
-  return static_cast<Outcome>(
-      std::find(outcome_names().begin(), outcome_names().end(), place.one_of(outcome_names(), "verdict")) -
-      outcome_names().begin());
+Outcome read_outcome(const JsonNode& node) {
+  if (node.json().is_null()) return Outcome::none;
+  return static_cast<Outcome>(std::find(outcome_names().begin(), outcome_names().end(), node.one_of(outcome_names(), "verdict")) -
+                              outcome_names().begin());
 }
 
 /// An infinite figure is written as null: evidence that is not there proves nothing, an error that is not finite is the largest.
-Real read_real(const Place& object, const char* key, Real instead) {
+Real read_real(const JsonNode& object, const char* key, Real instead) {
   return object.has(key) && !object[key].json().is_null() ? object[key].number() : instead;
 }
 
@@ -76,43 +75,43 @@ Json groups_json(const std::vector<const TestRecord*>& groups) {
   return json;
 }
 
-TestRecord read_test(const Place& place) {
-  place.expect_object();
+TestRecord read_test(const JsonNode& node) {
+  node.expect_object();
   TestRecord test;
-  test.channel = static_cast<int>(place["channel"].integer(-1, kMaxOutputs - 1));
-  test.samples = place["samples"].unsigned_integer(0);
-  test.epsilon = read_real(place, "epsilon", 0);
-  test.reference_error = read_real(place, "reference_error", kInfinity);
-  test.variance = read_real(place, "variance", kInfinity);
-  test.basis = place["basis"].one_of(kBases, "basis");
-  test.reference = read_real(place, "reference", 0);
-  test.mean_error = read_real(place, "mean_error", 0);
-  test.largest_error = read_real(place, "largest_error", kInfinity);
-  test.rounding = read_real(place, "rounding", 0);
+  test.channel = static_cast<int>(node["channel"].integer(-1, kMaxOutputs - 1));
+  test.samples = node["samples"].unsigned_integer(0);
+  test.epsilon = read_real(node, "epsilon", 0);
+  test.reference_error = read_real(node, "reference_error", kInfinity);
+  test.variance = read_real(node, "variance", kInfinity);
+  test.basis = node["basis"].one_of(kBases, "basis");
+  test.reference = read_real(node, "reference", 0);
+  test.mean_error = read_real(node, "mean_error", 0);
+  test.largest_error = read_real(node, "largest_error", kInfinity);
+  test.rounding = read_real(node, "rounding", 0);
   if (!test.deterministic()) {
-    const Place log_e = place["log_e"];
+    const JsonNode log_e = node["log_e"];
     log_e.expect_object();
     test.log_e_fail = read_real(log_e, "fail", -kInfinity);
     test.log_e_low = read_real(log_e, "low", -kInfinity);
     test.log_e_high = read_real(log_e, "high", -kInfinity);
     test.log_e_beyond = read_real(log_e, "beyond", -kInfinity);
-    test.planned = place["planned"].unsigned_integer(0);
-    if (place.has("rates"))
-      for (const Place& rate : place["rates"].elements())
+    test.planned = node["planned"].unsigned_integer(0);
+    if (node.has("rates"))
+      for (const JsonNode& rate : node["rates"].elements())
         if (!rate.json().is_null()) test.rates.push_back(rate.number());
   }
-  test.outcome = read_outcome(place["outcome"]);
+  test.outcome = read_outcome(node["outcome"]);
   return test;
 }
 
-void read_groups(const Place& place, int channel, std::vector<TestRecord>& tests) {
-  place.expect_object();
-  const std::vector<Place> basis = place["basis"].elements();
+void read_groups(const JsonNode& node, int channel, std::vector<TestRecord>& tests) {
+  node.expect_object();
+  const std::vector<JsonNode> basis = node["basis"].elements();
   std::vector<TestRecord> groups(basis.size());
   const auto read = [&](const char* key, Real TestRecord::*figure, Real instead) {
-    if (!place.has(key)) return;
-    const std::vector<Place> figures = place[key].elements();
-    if (figures.size() != groups.size()) place[key].fail("found another number of entries than in \"basis\"");
+    if (!node.has(key)) return;
+    const std::vector<JsonNode> figures = node[key].elements();
+    if (figures.size() != groups.size()) node[key].fail("found another number of entries than in \"basis\"");
     for (std::size_t i = 0; i < groups.size(); ++i)
       groups[i].*figure = figures[i].json().is_null() ? instead : figures[i].number();
   };
@@ -120,8 +119,8 @@ void read_groups(const Place& place, int channel, std::vector<TestRecord>& tests
     groups[i].channel = channel;
     groups[i].group = static_cast<int>(i);
     groups[i].basis = basis[i].one_of(kBases, "basis");
-    groups[i].epsilon = read_real(place, "epsilon", 0);
-    groups[i].samples = place["samples"].unsigned_integer(0);
+    groups[i].epsilon = read_real(node, "epsilon", 0);
+    groups[i].samples = node["samples"].unsigned_integer(0);
     groups[i].largest_error = kInfinity;
     groups[i].log_e_beyond = -kInfinity;
   }
@@ -186,54 +185,54 @@ Json verdict_json(const VerdictRecord& verdict) {
           {"lawful", outcome_json(verdict.lawful)}};
 }
 
-VerdictRecord read_verdict(const Place& place) {
-  place.expect_object();
+VerdictRecord read_verdict(const JsonNode& node) {
+  node.expect_object();
   VerdictRecord verdict;
-  verdict.unbiased = read_outcome(place["unbiased"]);
-  verdict.own_mean = read_outcome(place["own_mean"]);
-  verdict.lookups = read_outcome(place["lookups"]);
-  verdict.reason = place["reason"].string();
-  if (place.has("proves")) verdict.proves = place["proves"].string();
-  if (place.has("proven"))
-    for (const Place& what : place["proven"].elements()) {
+  verdict.unbiased = read_outcome(node["unbiased"]);
+  verdict.own_mean = read_outcome(node["own_mean"]);
+  verdict.lookups = read_outcome(node["lookups"]);
+  verdict.reason = node["reason"].string();
+  if (node.has("proves")) verdict.proves = node["proves"].string();
+  if (node.has("proven"))
+    for (const JsonNode& what : node["proven"].elements()) {
       const std::string word = what.one_of({"within", "beyond", "biased"}, "finding");
       (word == "within" ? verdict.within : word == "beyond" ? verdict.beyond : verdict.biased) = true;
     }
-  if (place.has("tolerate") && place["tolerate"].one_of(tolerances(), "bias to tolerate") == tolerances()[1])
+  if (node.has("tolerate") && node["tolerate"].one_of(tolerances(), "bias to tolerate") == tolerances()[1])
     verdict.tolerate = Tolerate::epsilon;
-  if (place.has("bound_unproven")) verdict.bound_unproven = place["bound_unproven"].boolean();
-  if (place.has("counted_walks")) verdict.counted_walks = place["counted_walks"].unsigned_integer(0);
-  if (place.has("untested"))
-    for (const Place& law : place["untested"].elements()) verdict.untested.push_back(law.string());
-  verdict.against = place["against"].one_of({"reference", "own mean"}, "target");
-  verdict.variance_basis = place["variance_basis"].one_of({"analytic", "pilot", "none"}, "basis");
-  verdict.planned_undecidable = place["planned_undecidable"].boolean();
-  verdict.violated = place["violated"].boolean();
-  verdict.nonfinite = place["nonfinite"].unsigned_integer(0);
-  verdict.out_of_range = place["out_of_range"].unsigned_integer(0);
-  verdict.samples_per_ray = place["samples_per_ray"].unsigned_integer(0);
-  verdict.planned = place["planned"].unsigned_integer(0);
+  if (node.has("bound_unproven")) verdict.bound_unproven = node["bound_unproven"].boolean();
+  if (node.has("counted_walks")) verdict.counted_walks = node["counted_walks"].unsigned_integer(0);
+  if (node.has("untested"))
+    for (const JsonNode& law : node["untested"].elements()) verdict.untested.push_back(law.string());
+  verdict.against = node["against"].one_of({"reference", "own mean"}, "target");
+  verdict.variance_basis = node["variance_basis"].one_of({"analytic", "pilot", "none"}, "basis");
+  verdict.planned_undecidable = node["planned_undecidable"].boolean();
+  verdict.violated = node["violated"].boolean();
+  verdict.nonfinite = node["nonfinite"].unsigned_integer(0);
+  verdict.out_of_range = node["out_of_range"].unsigned_integer(0);
+  verdict.samples_per_ray = node["samples_per_ray"].unsigned_integer(0);
+  verdict.planned = node["planned"].unsigned_integer(0);
   // Files without a tolerance are of before PASS took the planned samples.
-  if (!place.has("tolerate")) verdict.planned = std::min(verdict.planned, verdict.samples_per_ray);
-  verdict.affordable = place["affordable"].unsigned_integer(0);
-  verdict.family = place["family"].unsigned_integer(1);
-  verdict.lookups_family = place["lookups_family"].unsigned_integer(1);
+  if (!node.has("tolerate")) verdict.planned = std::min(verdict.planned, verdict.samples_per_ray);
+  verdict.affordable = node["affordable"].unsigned_integer(0);
+  verdict.family = node["family"].unsigned_integer(1);
+  verdict.lookups_family = node["lookups_family"].unsigned_integer(1);
   const auto level = [&](const char* key) {
-    const Real value = place[key].number();
-    if (!(value > 0 && value < 1)) place[key].expected("a number between 0 and 1");
+    const Real value = node[key].number();
+    if (!(value > 0 && value < 1)) node[key].expected("a number between 0 and 1");
     return value;
   };
   verdict.alpha = level("alpha");
   verdict.alpha_pass = level("alpha_pass");
-  for (const Place& test : place["tests"].elements()) {
+  for (const JsonNode& test : node["tests"].elements()) {
     verdict.tests.push_back(read_test(test));
     if (test.has("groups")) read_groups(test["groups"], verdict.tests.back().channel, verdict.tests);
   }
-  verdict.laws_family = place["laws_family"].unsigned_integer(1);
-  for (const Place& law : place["laws"].elements())
+  verdict.laws_family = node["laws_family"].unsigned_integer(1);
+  for (const JsonNode& law : node["laws"].elements())
     verdict.laws.push_back({law["name"].string(), read_real(law, "log_e", kInfinity), law["samples"].unsigned_integer(0),
                             read_outcome(law["outcome"])});
-  verdict.lawful = read_outcome(place["lawful"]);
+  verdict.lawful = read_outcome(node["lawful"]);
   return verdict;
 }
 

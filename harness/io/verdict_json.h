@@ -8,6 +8,6 @@ namespace nullmark {
 Json verdict_json(const VerdictRecord& verdict);
 
 /// Throws InputError.
-VerdictRecord read_verdict(const Place& place);
+VerdictRecord read_verdict(const JsonNode& node);
 
 }  // namespace nullmark

@@ -17,7 +17,8 @@ namespace nullmark {
 template <template <class> class Estimator, class Value>
 class BlockKernel : public Kernel {
   using E = Estimator<Value>;
-  using Ray = typename detail::RayOf<E, Value>::type;
+  using Traits = EstimatorTraits<E, Value>;
+  using RayData = typename Traits::RayData;
   using Walk = typename E::Walk;
 
   static constexpr std::size_t kBlock = 256;
@@ -27,7 +28,7 @@ class BlockKernel : public Kernel {
   static constexpr std::uint32_t kStepsBetweenStops = 1u << 14;
 
   struct State : Workspace {
-    Ray ray;
+    RayData ray;
     std::array<Walk, kBlock> walk;
     std::array<Flight, kBlock> flight;
     std::array<Rng, kBlock> rng;
@@ -38,45 +39,24 @@ class BlockKernel : public Kernel {
   };
 
  private:
-  static constexpr bool kSamplesEvents = requires(const E& e, const Walk& walk, const Ray& ray, const Flight& at) {
-    e.event(walk, ray, at);
-  };
-  static constexpr bool kTellsProfile = requires(const E& e, const Walk& walk, const Ray& ray) {
-    e.transmittance_at(walk, ray, Real{0});
-  };
-
  public:
   BlockKernel(const E& estimator, int channels) : estimator_(estimator), channels_(channels) {}
 
-  bool needs_optical_depth() const override {
-    if constexpr (requires { E::kNeedsOpticalDepth; }) return E::kNeedsOpticalDepth;
-    if constexpr (requires { estimator_.needs_optical_depth(); }) return estimator_.needs_optical_depth();
-    return false;
-  }
-
-  bool needs_knots() const override {
-    if constexpr (requires { E::kNeedsKnots; }) return E::kNeedsKnots;
-    return false;
-  }
-
-  bool states_theory() const override {
-    return requires(const E& e, const Ray& ray, const RayProfile& profile) {
-      e.theory(ray, profile, 0, Quantity::transmittance);
-    };
-  }
+  bool needs_optical_depth() const override { return Traits::needs_optical_depth(estimator_); }
+  bool needs_knots() const override { return Traits::kNeedsKnots; }
+  bool states_theory() const override { return Traits::kTheory; }
 
   bool answers(Quantity quantity) const override {
-    constexpr bool depth = requires(const E& e, const Walk& walk, const Ray& ray) { e.optical_depth(walk, ray); };
-    if (quantity == Quantity::optical_depth) return depth;
-    if (quantity == Quantity::transmittance_profile) return kTellsProfile && flies();
+    if (quantity == Quantity::optical_depth) return Traits::kOpticalDepth;
+    if (quantity == Quantity::transmittance_profile) return Traits::kTransmittanceAt && flies();
     if (quantity == Quantity::free_path) {
-      if constexpr (requires { estimator_.samples_events(channels_); }) return estimator_.samples_events(channels_);
-      return kSamplesEvents;
+      if constexpr (Traits::kSamplesEvents) return estimator_.samples_events(channels_);
+      return Traits::kEvent;
     }
     return quantity == Quantity::transmittance;
   }
 
-  std::size_t outputs(Quantity quantity, const RayContext& context) const override {
+  std::size_t outputs(Quantity quantity, const PreparedRay& context) const override {
     const auto channels = static_cast<std::size_t>(channels_);
     if (quantity == Quantity::transmittance_profile) return context.marks.size() * channels;
     if (quantity == Quantity::free_path) return (kFreePathBins + (scatters(context.albedo) ? 3 : 2)) * channels;
@@ -85,8 +65,8 @@ class BlockKernel : public Kernel {
 
   std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
 
-  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const RayContext& context) const override {
-    Ray& ray = static_cast<State&>(workspace).ray;
+  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const PreparedRay& context) const override {
+    RayData& ray = static_cast<State&>(workspace).ray;
     ray.begin = context.world.begin;
     ray.end = context.world.end;
     ray.channels = channels_;
@@ -100,15 +80,15 @@ class BlockKernel : public Kernel {
     ray.knots.assign(context.knots.begin(), context.knots.end());
     ray.degree = medium.polynomial_degree();
     ray.entry = context.world.at(context.world.begin);
-    if constexpr (requires { E::kNeedsInversion; })
+    if constexpr (Traits::kNeedsInversion)
       ray.distance_at_depth = [&medium, local = context.local](Real depth) { return distance_at_depth(medium, local, depth); };
-    if constexpr (requires { E::kNeedsShares; }) detail::prepare_shares(ray, medium, context.local);
+    if constexpr (Traits::kNeedsShares) detail::prepare_shares(ray, medium, context.local);
     ray.albedo = context.albedo.size() > 0 ? load<Value>(context.albedo.data(), channels_) : ray.value(0);
     ray.throughput = ray.value(1);
-    if constexpr (requires { estimator_.prepare(ray); }) estimator_.prepare(ray);
+    if constexpr (Traits::kPrepare) estimator_.prepare(ray);
   }
 
-  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+  void sample(Workspace& workspace, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
     State& state = static_cast<State&>(workspace);
     const std::size_t outputs = this->outputs(quantity, context);
@@ -123,27 +103,24 @@ class BlockKernel : public Kernel {
   }
 
   bool flies() const override {
-    constexpr bool by_another_law = requires { E::kIgnoresMajorant; }
-    || requires { E::kOwnFlights; };
-    if constexpr (requires { estimator_.flies_once(channels_); }) return !by_another_law && estimator_.flies_once(channels_);
+    constexpr bool by_another_law = Traits::kIgnoresMajorant || Traits::kOwnFlights;
+    if constexpr (Traits::kFliesOnce) return !by_another_law && estimator_.flies_once(channels_);
     return !by_another_law;
   }
 
-  bool states_count_law() const override {
-    return requires(const E& e, const Ray& ray, const RayProfile& profile) { e.count_law(ray, profile, 0); };
-  }
+  bool states_count_law() const override { return Traits::kCountLaw; }
 
   std::vector<CountLaw> count_law(const Workspace& workspace, const RayProfile& profile) const override {
     std::vector<CountLaw> laws;
-    if constexpr (requires(Ray r) { estimator_.count_law(r, profile, 0); }) {
-      const Ray& ray = static_cast<const State&>(workspace).ray;
+    if constexpr (Traits::kCountLaw) {
+      const RayData& ray = static_cast<const State&>(workspace).ray;
       for (int c = 0; c < channels_; ++c) laws.push_back(estimator_.count_law(ray, profile, c));
     }
     return laws;
   }
 
   Spectrum expected(const Workspace& workspace, const Spectrum& optical_depth, Quantity quantity) const override {
-    if constexpr (requires(Value v, Ray r) { estimator_.expected(v, r); }) {
+    if constexpr (Traits::kExpected) {
       const Value depth = load<Value>(optical_depth.data(), channels_);
       Spectrum result(channels_);
       store(estimator_.expected(depth, static_cast<const State&>(workspace).ray), result.data());
@@ -154,13 +131,13 @@ class BlockKernel : public Kernel {
 
   std::vector<Theory> theory(const Workspace& workspace, const RayProfile& profile, Quantity quantity) const override {
     std::vector<Theory> result(static_cast<std::size_t>(channels_));
-    if constexpr (requires(Ray r) { estimator_.theory(r, profile, 0, quantity); }) {
-      const Ray& ray = static_cast<const State&>(workspace).ray;
+    if constexpr (Traits::kTheory) {
+      const RayData& ray = static_cast<const State&>(workspace).ray;
       for (int c = 0; c < channels_; ++c) {
         Theory& theory = result[static_cast<std::size_t>(c)];
         theory = estimator_.theory(ray, profile, c, quantity);
         if (quantity == Quantity::free_path || quantity == Quantity::transmittance_profile) theory.mean = theory.variance = {};
-        if constexpr (requires(Ray r) { estimator_.weight_theory(r, profile, 0); })
+        if constexpr (Traits::kWeightTheory)
           if (quantity == Quantity::free_path) theory = estimator_.weight_theory(ray, profile, c);
       }
     }
@@ -169,9 +146,9 @@ class BlockKernel : public Kernel {
 
  private:
   template <bool recorded>
-  void run_block(State& state, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+  void run_block(State& state, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
                  std::size_t count, Quantity quantity, Real* values, std::uint32_t* lookups, Counters& counters) const {
-    const Ray& ray = state.ray;
+    const RayData& ray = state.ray;
     const auto channels = static_cast<std::size_t>(channels_);
     const std::size_t outputs = this->outputs(quantity, context);
     const bool profile = quantity == Quantity::transmittance_profile;
@@ -212,7 +189,7 @@ class BlockKernel : public Kernel {
             walk.total_depth = flight.depth() + flight.depth_left();
             walk.draws = state.rng[k].draws();
             walk.collisions = flight.collisions();
-            if constexpr (kSamplesEvents) {
+            if constexpr (Traits::kEvent) {
               const Event<Value> event = estimator_.event(state.walk[k], ray, state.flight[k]);
               walk.end = event.kind;
               walk.distance = event.distance;
@@ -248,7 +225,7 @@ class BlockKernel : public Kernel {
   }
 
   void look_up(State& state, const Medium& medium, std::size_t active) const {
-    if constexpr (requires { E::kNeedsShares; }) {
+    if constexpr (Traits::kNeedsShares) {
       for (std::size_t a = 0; a < active; ++a) {
         const std::uint32_t k = state.active[a];
         const int component = estimator_.component(state.walk[k]);
@@ -262,17 +239,15 @@ class BlockKernel : public Kernel {
 
   /// Most walks draw an exponential next; their logarithms are taken together.
   static void draw_ahead(State& state, std::size_t active) {
-    if constexpr (
-        requires { E::kIgnoresMajorant; } || requires { E::kOwnFlights; })
-      return;
+    if constexpr (Traits::kIgnoresMajorant || Traits::kOwnFlights) return;
     for (std::size_t a = 0; a < active; ++a) state.ahead[a] = state.rng[state.active[a]].peek();
     negative_logarithms(state.ahead.data(), active, state.ahead.data());
     for (std::size_t a = 0; a < active; ++a) state.rng[state.active[a]].make_ready(state.ahead[a]);
   }
 
   /// Tells the profile's marks that the walk has passed before its next collision at `reached`.
-  void mark(State& state, const Ray& ray, std::uint32_t k, Real reached, std::span<const Real> marks, Real* values) const {
-    if constexpr (kTellsProfile) {
+  void mark(State& state, const RayData& ray, std::uint32_t k, Real reached, std::span<const Real> marks, Real* values) const {
+    if constexpr (Traits::kTransmittanceAt) {
       std::uint32_t& marked = state.marked[k];
       for (; marked < marks.size() && marks[marked] < reached; ++marked)
         store(estimator_.transmittance_at(state.walk[k], ray, marks[marked]),
@@ -281,8 +256,8 @@ class BlockKernel : public Kernel {
   }
 
   /// Scores of a free path: its weight in the bin of its collision, where it scatters, where it escapes, and wherever it ends.
-  void score(State& state, const Ray& ray, std::uint32_t k, const RayContext& context, Real* values) const {
-    if constexpr (kSamplesEvents) {
+  void score(State& state, const RayData& ray, std::uint32_t k, const PreparedRay& context, Real* values) const {
+    if constexpr (Traits::kEvent) {
       const Event<Value> event = estimator_.event(state.walk[k], ray, state.flight[k]);
       const auto channels = static_cast<std::size_t>(channels_);
       std::fill(values, values + outputs(Quantity::free_path, context), Real{0});
@@ -302,10 +277,11 @@ class BlockKernel : public Kernel {
     }
   }
 
-  void finish(State& state, const Ray& ray, std::uint32_t k, Quantity quantity, const RayContext& context, Real* values) const {
+  void finish(State& state, const RayData& ray, std::uint32_t k, Quantity quantity, const PreparedRay& context,
+              Real* values) const {
     if (quantity == Quantity::transmittance_profile) return;
     if (quantity == Quantity::free_path) return score(state, ray, k, context, values);
-    if constexpr (requires(Walk w) { estimator_.optical_depth(w, ray); }) {
+    if constexpr (Traits::kOpticalDepth) {
       if (quantity == Quantity::optical_depth) {
         store(estimator_.optical_depth(state.walk[k], ray), values);
         return;
@@ -314,15 +290,14 @@ class BlockKernel : public Kernel {
     store(estimator_.result(state.walk[k], ray), values);
   }
 
-  std::uint64_t null_collisions(const Walk& walk, const Ray& ray, std::uint32_t lookups) const {
-    if constexpr (requires { E::kIgnoresMajorant; }) return 0;
-    if constexpr (requires { estimator_.real_collisions(walk, ray); })
-      return lookups - static_cast<std::uint64_t>(estimator_.real_collisions(walk, ray));
+  std::uint64_t null_collisions(const Walk& walk, const RayData& ray, std::uint32_t lookups) const {
+    if constexpr (Traits::kIgnoresMajorant) return 0;
+    if constexpr (Traits::kRealCollisions) return lookups - static_cast<std::uint64_t>(estimator_.real_collisions(walk, ray));
     return lookups;
   }
 
-  void audit(const Ray& ray, const Flight& at, const Value& extinction, Counters& counters) const {
-    if constexpr (requires { E::kIgnoresMajorant; }) return;
+  void audit(const RayData& ray, const Flight& at, const Value& extinction, Counters& counters) const {
+    if constexpr (Traits::kIgnoresMajorant) return;
     const Real bound = ray.majorant.rate(at.piece()), most = largest(extinction);
     if (exceeds(most, bound)) {
       ++counters.violations;

@@ -16,9 +16,8 @@ namespace nullmark {
 namespace {
 
 Plan planned(const std::string& experiment) {
-  return read_config(
-      R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"cells",)" + experiment + "}]}",
-      "test.json");
+  return read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"cells",)" + experiment + "}]}",
+                     "test.json");
 }
 
 constexpr const char* kFourCells[] = {
@@ -89,7 +88,7 @@ TEST(Crossing, AForcedCutOfAHomogeneousMediumIsWasted) {
 /// draws an exponential for each lookup, each crossing and the escape, and a decision for each lookup.
 TEST(Crossing, CostPredictsWhatThinWalksSpend) {
   const Plan plan = planned(
-      R"("rays":{"type":"chords","count":5000},"samples_per_ray":16,"gate":{"enabled":false},
+      R"("rays":{"type":"chords","count":5000},"samples_per_ray":16,"verdict":{"enabled":false},
          "matrix":{"estimator":["delta","ratio"],
                    "medium":[{"type":"fractal_noise","peak":0.02,"sharpness":4},{"type":"gaussian_bump","amplitude":0.02,"hi":[2,1,1]}],
                    "majorant":[{"type":"kd_tree","resolution":32,"looseness":10000,"crossing":"rewind"},
@@ -109,7 +108,7 @@ TEST(Crossing, CostPredictsWhatThinWalksSpend) {
 TEST(Crossing, NoPartitionAndNoRuleChangesTheLaw) {
   const Plan plan = planned(
       R"("rays":{"type":"single","from":[0.02,0.1,0.3],"to":[0.97,0.9,0.6]},"samples_per_ray":20000,
-         "gate":{"epsilon":0.02,"max_samples_per_ray":4000000,"laws":"always"},
+         "verdict":{"epsilon":0.02,"max_samples_per_ray":4000000,"laws":"always"},
          "matrix":{"estimator":["delta","ratio",{"type":"residual_ratio","control":"average"},"residual_delta","next_flight_ratio",
                                 "next_flight_delta"],
                    "medium":[{"type":"linear","optical_depth":1},{"type":"gaussian_bump","amplitude":8},

@@ -10,6 +10,9 @@ namespace nullmark {
 /// Adapts an estimator template to the registry: its parameters live in the grey instance.
 template <template <class> class Estimator>
 class EstimatorTemplate final : public EstimatorSource {
+  using Traits = EstimatorTraits<Estimator<Real>, Real>;
+  static_assert(expect_estimator<Estimator<Real>, Real>() && expect_estimator<Estimator<Spectrum>, Spectrum>());
+
  public:
   void parameters(ParameterVisitor& visit) override {
     visit_parameters(grey_, visit);
@@ -19,15 +22,15 @@ class EstimatorTemplate final : public EstimatorSource {
       visit_parameters(single_, visit);
     }
   }
-  Claim claim(Quantity quantity) const override { return grey_.claim(quantity); }
+  Guarantee claim(Quantity quantity) const override { return grey_.claim(quantity); }
   SampleRange range(int channels) const override { return channels == 1 ? range_of(grey_) : range_of(chromatic_); }
   bool needs_bound() const override { return Estimator<Real>::kNeedsBound; }
   std::optional<Real> order(Quantity quantity) const override {
-    if constexpr (requires { grey_.order(quantity); }) return grey_.order(quantity);
+    if constexpr (Traits::kOrder) return grey_.order(quantity);
     return std::nullopt;
   }
   void check(const Extrema& medium) const override {
-    if constexpr (requires { grey_.check(medium); }) grey_.check(medium);
+    if constexpr (Traits::kCheck) grey_.check(medium);
   }
   std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64) const override {
     if (channels == 1) {

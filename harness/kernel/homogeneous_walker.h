@@ -24,11 +24,11 @@ class HomogeneousWalker final : public Walker<Value> {
   bool needs_knots() const override { return false; }
   bool needs_optical_depth() const override { return false; }
 
-  void begin(WalkMemory& memory, const Course<Value>&, const Ray& world, const Ray&) const override {
+  void begin(WalkMemory& memory, const PathScene<Value>&, const Ray& world, const Ray&) const override {
     static_cast<State&>(memory).length = world.end - world.begin;
   }
 
-  Event<Value> fly(WalkMemory& memory, const Course<Value>& course, const Value& throughput, Rng& rng, Patience&,
+  Event<Value> fly(WalkMemory& memory, const PathScene<Value>& path_scene, const Value& throughput, Rng& rng, EventBudget&,
                    Counters&) const override {
     const Real length = static_cast<State&>(memory).length;
     if constexpr (std::is_same_v<Value, Real>) {
@@ -39,7 +39,7 @@ class HomogeneousWalker final : public Walker<Value> {
       share /= share.sum();
       Real rest = rng.uniform();
       int chosen = 0;
-      while (chosen + 1 < course.channels && rest >= share[chosen]) rest -= share[chosen++];
+      while (chosen + 1 < path_scene.channels && rest >= share[chosen]) rest -= share[chosen++];
       const Real t = extinction_[chosen] > 0 ? rng.exponential() / extinction_[chosen] : kInfinity;
       const bool collides = t < length;
       // Relative to the chosen channel, so that no density underflows.
@@ -49,7 +49,7 @@ class HomogeneousWalker final : public Walker<Value> {
     }
   }
 
-  Value transmittance(WalkMemory& memory, const Course<Value>&, Rng&, Patience&, Counters&) const override {
+  Value transmittance(WalkMemory& memory, const PathScene<Value>&, Rng&, EventBudget&, Counters&) const override {
     return exponential(Value(-extinction_ * static_cast<State&>(memory).length));
   }
 

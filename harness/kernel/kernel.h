@@ -12,7 +12,7 @@
 namespace nullmark {
 
 /// One ray prepared for sampling: what the medium, the majorant structure and the references know of it.
-struct RayContext {
+struct PreparedRay {
   Ray world, local;  ///< cut to the medium
   std::uint32_t index = 0;
   SegmentBuffer segments;
@@ -118,13 +118,13 @@ class Kernel {
   virtual std::unique_ptr<Workspace> workspace() const = 0;
 
   /// Numbers that one sample of a quantity gives.
-  virtual std::size_t outputs(Quantity, const RayContext&) const = 0;
+  virtual std::size_t outputs(Quantity, const PreparedRay&) const = 0;
 
   /// Prepares a ray; the samples and theory of that ray follow.
-  virtual void begin_ray(Workspace&, const Medium&, const Extrema& medium, const RayContext&) const = 0;
+  virtual void begin_ray(Workspace&, const Medium&, const Extrema& medium, const PreparedRay&) const = 0;
 
   /// Draws samples first .. first + count - 1 of the ray.
-  virtual void sample(Workspace&, const Medium&, const RayContext&, std::uint64_t key, std::uint64_t first, std::size_t count,
+  virtual void sample(Workspace&, const Medium&, const PreparedRay&, std::uint64_t key, std::uint64_t first, std::size_t count,
                       Quantity, SampleBlock& out, Counters&) const = 0;
 
   /// Mean of the estimator's target on this ray, given the exact optical depth: T = exp(-tau) or tau, unless it names another.
@@ -156,7 +156,7 @@ class EstimatorSource {
  public:
   virtual ~EstimatorSource() = default;
   virtual void parameters(ParameterVisitor& visit) = 0;
-  virtual Claim claim(Quantity) const = 0;
+  virtual Guarantee claim(Quantity) const = 0;
   virtual SampleRange range(int channels) const = 0;
   virtual bool needs_bound() const = 0;
   /// Of a consistent estimator; empty where none is stated.

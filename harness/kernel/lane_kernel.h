@@ -37,11 +37,12 @@ template <std::size_t n, class Aggregate, class Visit>
 template <template <class> class Estimator, class T, std::size_t N = kNativeLanes<T>>
 class LaneKernel final : public BlockKernel<Estimator, Real> {
   using Base = BlockKernel<Estimator, Real>;
+  using Traits = EstimatorTraits<Estimator<Real>, Real>;
   using Pack = Lanes<T, N>;
   using Mask = LaneMask<T, N>;
   using Index = LaneIndex<T, N>;
   using E = Estimator<Pack>;
-  using Course = LaneCourse<T, N>;
+  using Rates = LaneRates<T, N>;
   using Streams = LaneRng<T, N>;
 
   static constexpr bool kSingle = !std::is_same_v<T, Real>;
@@ -89,7 +90,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
 
   bool flies() const override { return !kSingle && Base::flies(); }
 
-  void sample(Workspace& workspace, const Medium& medium, const RayContext& context, std::uint64_t key, std::uint64_t first,
+  void sample(Workspace& workspace, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity quantity, SampleBlock& out, Counters& counters) const override {
     State& state = static_cast<State&>(workspace);
     // One walk would leave all lanes but its own idle.
@@ -120,13 +121,13 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     const LaneKernel& kernel;
     State& state;
     const Medium& medium;
-    const RayContext& context;
+    const PreparedRay& context;
     SampleAddress first;
     Quantity quantity;
     Real* values;
     std::uint32_t* lookups;
     Counters& counters;
-    Course course = {}, majorant = Course(state.ray.majorant);
+    Rates rates = {}, majorant = Rates(state.ray.majorant);
     std::array<T, 3> origin = narrowed(context.local.origin), direction = narrowed(context.local.direction);
 
     static std::array<T, 3> narrowed(const Vec3& v) {
@@ -151,7 +152,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
         }
         const auto& [x, y, z] = state.points;
         medium.extinction(BasicPoints<T>{x.data(), y.data(), z.data(), lanes}, state.extinction.data());
-        if (course.has_several())
+        if (rates.has_several())
           for (std::size_t k = 0; k < lanes; k += N) go_on<true>(k, step, tally);
         else
           for (std::size_t k = 0; k < lanes; k += N) go_on<false>(k, step, tally);
@@ -161,14 +162,14 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       counters.draws += tally.draws;
       counters.lookups += tally.lookups;
       counters.violations += tally.violations;
-      if constexpr (!requires { E::kIgnoresMajorant; }) counters.null_collisions += tally.lookups - tally.real;
+      if constexpr (!Traits::kIgnoresMajorant) counters.null_collisions += tally.lookups - tally.real;
     }
 
     [[gnu::noinline]] void set_out(std::size_t k, Mask there, Tally& tally) {
       Walks walks;
       walks.stream = Streams::seeded({first.key, first.ray, first.sample + k});
       walks.sample = Index::counting_from(static_cast<typename Index::Number>(k));
-      LaneFlight<T, N> flight(course, walks.place);
+      LaneFlight<T, N> flight(rates, walks.place);
       Streams rng(walks.stream, there);
       flight.start(state.ray.majorant);
       kernel.estimator_.init(walks.walk, state.ray, flight, rng);
@@ -187,7 +188,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
         using Number = std::remove_reference_t<decltype(lanes)>;
         lanes = Number(hn::BitCast(hn::DFromV<decltype(raw(lanes))>(), Pack::load(&state.numbers[n][k]).vector()));
       });
-      LaneFlight<T, N, several> flight(course, walks.place);
+      LaneFlight<T, N, several> flight(rates, walks.place);
       Streams rng(walks.stream, alive);
       const Pack extinction = Pack::load(&state.extinction[k]);
       audit<several>(flight.piece(), extinction, alive, tally);
@@ -224,7 +225,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
 
     template <bool several>
     [[gnu::always_inline]] void audit(Index piece, Pack extinction, Mask alive, Tally& tally) {
-      if constexpr (requires { E::kIgnoresMajorant; }) return;
+      if constexpr (Traits::kIgnoresMajorant) return;
       const Pack bound = majorant.template rate<several>(piece);
       Mask beyond = extinction > bound * Pack(1 + kBoundRounding<T>);
       if (none(beyond)) return;
@@ -251,7 +252,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
         close(close_dead, state.numbers[kSample], state.left_sample, left);
         left += count(dead);
         for (std::size_t n = 0; n < kNumbers; ++n)
-          if (n != kPiece || course.has_several()) close(close_living, state.numbers[n], state.numbers[n], kept);
+          if (n != kPiece || rates.has_several()) close(close_living, state.numbers[n], state.numbers[n], kept);
         for (std::size_t axis = 0; axis < 3; ++axis)
           if (moves_along(axis)) close(close_living, state.points[axis], state.points[axis], kept);
         kept += count(alive);
@@ -292,7 +293,7 @@ template <template <class> class Estimator>
 constexpr bool runs_in_lanes() {
   if constexpr (requires { Estimator<Real>::kLanes; }) {
     using E = LanesOf<Estimator, Real>;
-    using Along = typename detail::RayOf<Estimator<Real>, Real>::type;
+    using Along = typename detail::RayDataOf<Estimator<Real>, Real>::type;
     constexpr std::size_t kWidth = kNativeLanes<Real>;
     return requires(const E& e, typename E::Walk& walk, const Along& ray, LaneFlight<Real, kWidth>& flight,
                     LaneRng<Real, kWidth>& rng, const Lanes<Real, kWidth>& extinction) {

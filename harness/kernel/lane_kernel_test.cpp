@@ -102,7 +102,7 @@ std::vector<Case> cases() {
 Sampled sampled(const Kernel& kernel, const Case& with, std::size_t count, Quantity quantity = Quantity::transmittance) {
   const auto workspace = kernel.workspace();
   const Extrema extrema = with.medium->extrema(with.medium->bounds());
-  RayContext context;
+  PreparedRay context;
   context.index = 5;
   context.local = clipped(transformed(with.world, with.medium->world_to_local()), with.medium->bounds());
   context.world = with.world;

@@ -66,7 +66,7 @@ class Paths {
   TransportScene scene_;
   std::unique_ptr<const Kernel> kernel_;
   std::unique_ptr<Workspace> workspace_;
-  RayContext context_;
+  PreparedRay context_;
   SampleBlock block_;
   Counters counters_;
 };

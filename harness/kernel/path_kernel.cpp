@@ -3,189 +3,11 @@
 #include <fmt/format.h>
 
 #include "harness/kernel/homogeneous_walker.h"
+#include "harness/kernel/radiance_kernel.h"
 #include "harness/kernel/walker.h"
 
 namespace nullmark {
 namespace {
-
-/// A ray from a point of the scene up to a surface, and the part of it inside the medium, which begins at 0.
-struct Sight {
-  Ray world, local;
-  SurfaceHit hit;
-};
-
-Ray moved_to_begin(Ray ray) {
-  ray.origin = ray.at(ray.begin);
-  ray.end -= ray.begin;
-  ray.begin = 0;
-  return ray;
-}
-
-/// Where the medium lies.
-struct Place {
-  explicit Place(const Medium& medium) : to_local(medium.world_to_local()), bounds(medium.bounds()) {}
-
-  void look(Ray ray, std::span<const Surface> surfaces, Sight& out) const {
-    const SurfaceHit hit = first_hit(surfaces, ray);
-    ray.end = std::min(ray.end, hit.distance);
-    look(ray, out);
-    out.hit = hit;
-  }
-
-  void look(Ray ray, Sight& out) const {
-    out.hit = {};
-    out.local = clipped(transformed(ray, to_local), bounds);
-    ray.begin = out.local.begin;
-    ray.end = out.local.end;
-    out.world = moved_to_begin(ray);
-    out.local = moved_to_begin(out.local);
-  }
-
-  Affine to_local;
-  Box bounds;
-};
-
-Ray camera_ray(const RayContext& context) { return {context.world.origin, context.world.direction, 0, kInfinity}; }
-
-Spectrum or_black(const Spectrum& radiance, int channels) { return radiance_or_black<Spectrum>(radiance, channels); }
-
-Spectrum radiance_behind(const TransportScene& scene, const SurfaceHit& hit) {
-  return or_black(hit.surface ? hit.surface->radiance : scene.environment.radiance, scene.medium->channels());
-}
-
-/// What is known of the mean: see make_path_kernel.
-Spectrum known_radiance(const TransportScene& scene, const Ray& camera) {
-  const int channels = scene.medium->channels();
-  const Effects effects = effects_of(scene);
-  Spectrum environment = or_black(scene.environment.radiance, channels);
-  const Spectrum emitted = or_black(scene.emission.radiance, channels);
-  if (effects.emission && scene.emission.field) return Spectrum::Constant(channels, std::nan(""));
-  if (!effects.scattering) {
-    Sight sight;
-    Place(*scene.medium).look(camera, scene.surfaces, sight);
-    const Spectrum depth = optical_depth(*scene.medium, sight.local).depth;
-    const Spectrum transmittance = (-depth).exp(), absorbed = -depth.unaryExpr([](Real x) { return std::expm1(-x); });
-    return transmittance * radiance_behind(scene, sight.hit) + absorbed * emitted;
-  }
-  bool equilibrium = !effects.absorption || (emitted == environment).all();
-  for (const Surface& surface : scene.surfaces)
-    equilibrium = equilibrium && (or_black(surface.radiance, channels) == environment).all();
-  if (equilibrium && !scene.options.most_scatterings) return environment;
-  return Spectrum::Constant(channels, std::nan(""));
-}
-
-class RadianceKernel : public Kernel {
- public:
-  explicit RadianceKernel(const TransportScene& scene)
-      : scene_(scene),
-        place_(*scene.medium),
-        extrema_(scene.medium->extrema(place_.bounds)),
-        channels_(scene.medium->channels()) {}
-
-  bool needs_optical_depth() const override { return false; }
-  bool needs_knots() const override { return false; }
-  bool states_theory() const override { return false; }
-  bool answers(Quantity quantity) const override { return quantity == Quantity::radiance; }
-  std::size_t outputs(Quantity, const RayContext&) const override { return static_cast<std::size_t>(channels_); }
-  bool flies() const override { return false; }
-  bool states_count_law() const override { return false; }
-  std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const override { return {}; }
-  std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const override {
-    return std::vector<Theory>(static_cast<std::size_t>(channels_));
-  }
-
- protected:
-  TransportScene scene_;
-  Place place_;
-  Extrema extrema_;
-  int channels_;
-};
-
-/// Where light is only absorbed, by constant extinction: nothing is drawn.
-class BeerLambertKernel final : public RadianceKernel {
-  struct State final : Workspace {
-    Spectrum radiance;
-  };
-
- public:
-  using RadianceKernel::RadianceKernel;
-
-  std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
-
-  void begin_ray(Workspace& workspace, const Medium&, const Extrema&, const RayContext& context) const override {
-    static_cast<State&>(workspace).radiance = known_radiance(scene_, camera_ray(context));
-  }
-
-  void sample(Workspace& workspace, const Medium&, const RayContext&, std::uint64_t, std::uint64_t, std::size_t count, Quantity,
-              SampleBlock& out, Counters& counters) const override {
-    const Spectrum& radiance = static_cast<State&>(workspace).radiance;
-    out.values.clear();
-    for (std::size_t i = 0; i < count; ++i) out.values.insert(out.values.end(), radiance.begin(), radiance.end());
-    out.lookups.assign(count, 0);
-    counters.samples += count;
-  }
-
-  Spectrum expected(const Workspace& workspace, const Spectrum&, Quantity) const override {
-    return static_cast<const State&>(workspace).radiance;
-  }
-};
-
-/// Where light is only absorbed, by any medium: the estimator's T times the radiance behind.
-class AbsorptionKernel final : public RadianceKernel {
-  struct State final : Workspace {
-    std::unique_ptr<Workspace> inner;
-    RayContext context;
-    Ray camera;
-    Spectrum behind;
-  };
-
- public:
-  AbsorptionKernel(const TransportScene& scene, std::unique_ptr<const Kernel> transmittance)
-      : RadianceKernel(scene), transmittance_(std::move(transmittance)) {}
-
-  std::unique_ptr<Workspace> workspace() const override {
-    auto state = std::make_unique<State>();
-    state->inner = transmittance_->workspace();
-    return state;
-  }
-
-  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const RayContext& context) const override {
-    State& state = static_cast<State&>(workspace);
-    state.camera = camera_ray(context);
-    Sight sight;
-    place_.look(state.camera, scene_.surfaces, sight);
-    state.behind = radiance_behind(scene_, sight.hit);
-    RayContext& mine = state.context;
-    mine.world = sight.world;
-    mine.local = sight.local;
-    mine.index = context.index;
-    mine.albedo = context.albedo;
-    scene_.majorant->segments(mine.world, mine.local, mine.segments);
-    mine.knots.clear();
-    mine.exact_depth.reset();
-    if (transmittance_->needs_knots()) sorted_knots(medium, mine.local, mine.knots);
-    if (transmittance_->needs_optical_depth()) mine.exact_depth = optical_depth(medium, mine.local).depth;
-    transmittance_->begin_ray(*state.inner, medium, extrema, mine);
-  }
-
-  void sample(Workspace& workspace, const Medium& medium, const RayContext&, std::uint64_t key, std::uint64_t first,
-              std::size_t count, Quantity, SampleBlock& out, Counters& counters) const override {
-    State& state = static_cast<State&>(workspace);
-    state.inner->stop = state.stop;
-    state.inner->recording = state.recording;
-    transmittance_->sample(*state.inner, medium, state.context, key, first, count, Quantity::transmittance, out, counters);
-    const auto channels = static_cast<std::size_t>(channels_);
-    for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t c = 0; c < channels; ++c) out.values[i * channels + c] *= state.behind[static_cast<Eigen::Index>(c)];
-  }
-
-  Spectrum expected(const Workspace& workspace, const Spectrum&, Quantity) const override {
-    return known_radiance(scene_, static_cast<const State&>(workspace).camera);
-  }
-
- private:
-  std::unique_ptr<const Kernel> transmittance_;
-};
 
 bool vanished(Real weight) { return weight == 0; }
 bool vanished(const Spectrum& weight) { return (weight == 0).all(); }
@@ -206,7 +28,7 @@ class PathKernel final : public RadianceKernel {
   struct State final : Workspace {
     Ray camera_ray;
     Leg camera, onward, shadow;  ///< of all samples; after a scattering; towards the environment
-    Course<Value> course;
+    PathScene<Value> path_scene;
   };
 
  public:
@@ -228,26 +50,26 @@ class PathKernel final : public RadianceKernel {
     return state;
   }
 
-  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema&, const RayContext& context) const override {
+  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema&, const PreparedRay& context) const override {
     State& state = static_cast<State&>(workspace);
-    state.course = {&medium, &extrema_, scene_.majorant.get(), channels_, albedo_, kEffects.emission};
+    state.path_scene = {&medium, &extrema_, scene_.majorant.get(), channels_, albedo_, kEffects.emission};
     state.camera_ray = camera_ray(context);
     begin_leg(state, state.camera, *walker_, state.camera_ray);
   }
 
-  void sample(Workspace& workspace, const Medium&, const RayContext& context, std::uint64_t key, std::uint64_t first,
+  void sample(Workspace& workspace, const Medium&, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
               std::size_t count, Quantity, SampleBlock& out, Counters& counters) const override {
     State& state = static_cast<State&>(workspace);
     const auto channels = static_cast<std::size_t>(channels_);
     out.values.resize(count * channels);
     out.lookups.assign(count, 0);
     counters.samples += count;
-    Patience patience(state.stop);
-    for (std::size_t k = 0; k < count && !patience.stopped(); ++k) {
+    EventBudget budget(state.stop);
+    for (std::size_t k = 0; k < count && !budget.stopped(); ++k) {
       Rng rng(SampleAddress{key, context.index, first + k});
       const std::uint64_t lookups_before = counters.lookups;
-      patience.start(scene_.options.most_events);
-      store(path(state, rng, patience, counters), &out.values[k * channels]);
+      budget.start(scene_.options.most_events);
+      store(path(state, rng, budget, counters), &out.values[k * channels]);
       out.lookups[k] = static_cast<std::uint32_t>(counters.lookups - lookups_before);
       counters.draws += rng.draws();
       if (state.recording) {
@@ -255,7 +77,7 @@ class PathKernel final : public RadianceKernel {
         state.recording->walks.back().draws = rng.draws();
       }
     }
-    counters.overruns += patience.overruns();
+    counters.overruns += budget.overruns();
   }
 
   Spectrum expected(const Workspace& workspace, const Spectrum&, Quantity) const override {
@@ -274,19 +96,19 @@ class PathKernel final : public RadianceKernel {
 
   void begin_leg(State& state, Leg& leg, const Walker<Value>& walker, const Ray& ray) const {
     if constexpr (kEffects.surfaces)
-      place_.look(ray, scene_.surfaces, leg.sight);
+      frame_.look(ray, scene_.surfaces, leg.sight);
     else
-      place_.look(ray, leg.sight);
-    if (leg.sight.world.length() > 0) walker.begin(*leg.memory, state.course, leg.sight.world, leg.sight.local);
+      frame_.look(ray, leg.sight);
+    if (leg.sight.world.length() > 0) walker.begin(*leg.memory, state.path_scene, leg.sight.world, leg.sight.local);
   }
 
-  Value path(State& state, Rng& rng, Patience& patience, Counters& counters) const {
+  Value path(State& state, Rng& rng, EventBudget& budget, Counters& counters) const {
     Value radiance = uniform(0), throughput = uniform(1);
     Leg* leg = &state.camera;
     for (int scatterings = 0;; ++scatterings) {
       Event<Value> event{EventKind::escape, 0, uniform(1)};
-      if (leg->sight.world.length() > 0) event = walker_->fly(*leg->memory, state.course, throughput, rng, patience, counters);
-      if (!patience.spend()) return radiance;
+      if (leg->sight.world.length() > 0) event = walker_->fly(*leg->memory, state.path_scene, throughput, rng, budget, counters);
+      if (!budget.spend()) return radiance;
       throughput *= event.weight;
       if (!is_collision(event.kind)) {
         radiance += throughput * radiance_at_end(leg->sight, scatterings);
@@ -302,7 +124,7 @@ class PathKernel final : public RadianceKernel {
       const Vec3& direction = leg->sight.world.direction;
       if constexpr (kEffects.next_event)
         if (scene_.options.next_event != NextEvent::off)
-          radiance += throughput * from_environment(state, point, direction, rng, patience, counters);
+          radiance += throughput * from_environment(state, point, direction, rng, budget, counters);
       if (vanished(throughput) || !survives(scatterings + 1, throughput, rng)) return radiance;
       begin_leg(state, state.onward, *walker_, {point, phase_.sample(direction, rng), 0, kInfinity});
       leg = &state.onward;
@@ -341,7 +163,7 @@ class PathKernel final : public RadianceKernel {
   }
 
   /// Radiance that comes from the environment straight to a point and is scattered there into the path.
-  Value from_environment(State& state, const Vec3& point, const Vec3& direction, Rng& rng, Patience& patience,
+  Value from_environment(State& state, const Vec3& point, const Vec3& direction, Rng& rng, EventBudget& budget,
                          Counters& counters) const {
     Vec3 towards;
     Real weight = 1;  // phase function over density of the direction
@@ -356,7 +178,7 @@ class PathKernel final : public RadianceKernel {
     begin_leg(state, leg, *shadow_walker_, {point, towards, 0, kInfinity});
     if (leg.sight.hit.surface) return uniform(0);
     if (!(leg.sight.world.length() > 0)) return environment_ * weight;
-    return shadow_walker_->transmittance(*leg.memory, state.course, rng, patience, counters) * environment_ * weight;
+    return shadow_walker_->transmittance(*leg.memory, state.path_scene, rng, budget, counters) * environment_ * weight;
   }
 
   bool survives(int scatterings, Value& throughput, Rng& rng) const {
@@ -453,8 +275,8 @@ std::unique_ptr<const Kernel> make_path_kernel(const EstimatorSource& estimator,
     throw ParameterError("type", "the estimator cannot carry light here: " + reason);
   const Effects effects = asked_for(scene, general);
   if (!effects.scattering && !effects.emission) {
-    if (!effects.heterogeneous) return std::make_unique<BeerLambertKernel>(scene);
-    return std::make_unique<AbsorptionKernel>(scene, estimator.kernel(scene.medium->channels()));
+    if (!effects.heterogeneous) return make_beer_lambert_kernel(scene);
+    return make_absorption_kernel(scene, estimator.kernel(scene.medium->channels()));
   }
   const Walkers walkers = estimator.walkers();
   if (effects.chromatic) return make<Spectrum>(scene, effects, walkers.chromatic, scene.towards_environment.chromatic);

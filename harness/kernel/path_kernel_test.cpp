@@ -37,20 +37,20 @@ struct SpectralTracking {
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = true;
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Ray : Passage<Value> {
+  struct RayData : MediumRay<Value> {
     Value throughput;
   };
   struct Walk {
     Event<Value> event;
   };
 
-  void init(Walk& walk, const Ray& ray, Flight&, auto&) const { walk.event = {EventKind::escape, ray.end, ray.value(1)}; }
-  bool propose(Walk& walk, const Ray&, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight&, auto&) const { walk.event = {EventKind::escape, ray.end, ray.value(1)}; }
+  bool propose(Walk& walk, const RayData&, Flight& flight, auto& rng) const {
     return !is_collision(walk.event.kind) && flight.next(rng);
   }
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     const Value absorption = ray.draws_absorption ? Value(extinction * (1 - ray.albedo)) : ray.value(0);
     const Value scattering = extinction * ray.albedo, null = at.rate() - extinction;
     const auto carried = [&](const Value& mu) {
@@ -74,14 +74,14 @@ struct SpectralTracking {
   }
   /// Told by every walk that ended so.
   inline static std::uint64_t absorbed = 0;
-  Event<Value> event(const Walk& walk, const Ray&, const Flight&) const {
+  Event<Value> event(const Walk& walk, const RayData&, const Flight&) const {
     absorbed += walk.event.kind == EventKind::absorb;
     return walk.event;
   }
-  Value result(const Walk& walk, const Ray& ray) const {
+  Value result(const Walk& walk, const RayData& ray) const {
     return is_collision(walk.event.kind) ? ray.value(0) : walk.event.weight;
   }
-  int real_collisions(const Walk& walk, const Ray&) const { return is_collision(walk.event.kind); }
+  int real_collisions(const Walk& walk, const RayData&) const { return is_collision(walk.event.kind); }
 };
 
 }  // namespace path_kernel_test
@@ -133,8 +133,8 @@ TransportScene scene_of(std::shared_ptr<const Medium> medium, const Spectrum& al
 
 Ray camera(const Vec3& from, const Vec3& direction) { return {from, direction.normalized(), 0, kInfinity}; }
 
-RayContext context_of(const TransportScene& scene, const Ray& ray, std::uint32_t index = 0) {
-  RayContext context;
+PreparedRay context_of(const TransportScene& scene, const Ray& ray, std::uint32_t index = 0) {
+  PreparedRay context;
   context.world = ray;
   context.local = clipped(transformed(ray, scene.medium->world_to_local()), scene.medium->bounds());
   context.world.begin = context.local.begin;
@@ -152,7 +152,7 @@ struct Estimate {
 
 Estimate sample(const Kernel& kernel, const TransportScene& scene, const Ray& ray, std::size_t count, std::uint64_t key = 1) {
   const auto workspace = kernel.workspace();
-  const RayContext context = context_of(scene, ray);
+  const PreparedRay context = context_of(scene, ray);
   kernel.begin_ray(*workspace, *scene.medium, scene.medium->extrema(scene.medium->bounds()), context);
   Estimate estimate;
   SampleBlock block;
@@ -405,7 +405,7 @@ TEST(PathAbsorption, IsTheTransmittanceKernelTimesWhatLiesBehind) {
     const Estimate path = radiance(estimator, scene, ray, 3000);
     const auto kernel = estimator.kernel(scene.medium->channels());
     const Ray shortened{ray.origin, ray.direction, 0, end};
-    RayContext context = context_of(scene, shortened);
+    PreparedRay context = context_of(scene, shortened);
     const auto workspace = kernel->workspace();
     SampleBlock block;
     Counters counters;
@@ -504,8 +504,8 @@ TEST(PathScattering, EveryHonestSamplerMeetsSingleScattering) {
   int walked = 0;
   for (const EstimatorEntry& entry : Registry<EstimatorEntry>::instance().entries()) {
     const auto estimator = entry.make();
-    const Claim claim = estimator->claim(Quantity::free_path);
-    if (entry.planted || (claim != Claim::exact && claim != Claim::unbiased)) continue;
+    const Guarantee claim = estimator->claim(Quantity::free_path);
+    if (entry.planted || (claim != Guarantee::exact && claim != Guarantee::unbiased)) continue;
     for (const bool chromatic : {false, true}) {
       TransportScene scene = scene_of(chromatic ? times(grey, factors) : grey, chromatic ? albedos : spectrum({0.4}), true);
       scene.mean_cosine = 0.6;
@@ -558,7 +558,7 @@ TEST(PathScattering, PowerExchangeBetweenSpheresIsReciprocal) {
         Rng rng(SampleAddress{key, i, 0});
         const Vec3 normal = Isotropic{}.sample(Vec3::UnitZ(), rng);
         const Vec3 lambert = (normal + Isotropic{}.sample(Vec3::UnitZ(), rng)).normalized();  // cosine-weighted
-        const RayContext context = context_of(scene, camera(to.center + to.radius * normal, lambert), i);
+        const PreparedRay context = context_of(scene, camera(to.center + to.radius * normal, lambert), i);
         kernel->begin_ray(*workspace, *scene.medium, extrema, context);
         kernel->sample(*workspace, *scene.medium, context, key + 1, 0, 1, Quantity::transmittance, block, sum.counters);
         sum.mean[0] += block.values[0] / kRays;
@@ -686,7 +686,7 @@ TEST(PathKernel, SamplesDependOnTheirAddressAlone) {
   scene.options.next_event = NextEvent::phase;
   const auto kernel = make_path_kernel(kDelta, scene);
   const Extrema extrema = scene.medium->extrema(scene.medium->bounds());
-  const RayContext context = context_of(scene, kOblique, 3), another = context_of(scene, camera({0.5, 0.5, -1}, {0, 0.1, 1}), 4);
+  const PreparedRay context = context_of(scene, kOblique, 3), another = context_of(scene, camera({0.5, 0.5, -1}, {0, 0.1, 1}), 4);
   SampleBlock whole, part;
   Counters counters, again;
   const auto workspace = kernel->workspace(), used = kernel->workspace();
@@ -710,7 +710,7 @@ TEST(PathKernel, PathsThatDoNotEndAreOverruns) {
   for (const bool general : {false, true}) {
     const auto kernel = make_path_kernel(kDelta, scene, general);
     const auto workspace = kernel->workspace();
-    const RayContext context = context_of(scene, camera({0.5, 0.5, 0.5}, {1, 0, 0}));
+    const PreparedRay context = context_of(scene, camera({0.5, 0.5, 0.5}, {1, 0, 0}));
     kernel->begin_ray(*workspace, *scene.medium, scene.medium->extrema(scene.medium->bounds()), context);
     SampleBlock block;
     Counters counters;
@@ -734,7 +734,7 @@ TEST(PathKernel, ViolatedMajorantsAreCounted) {
   scene.environment.radiance = spectrum({1});
   const auto kernel = make_path_kernel(kDelta, scene);
   const auto workspace = kernel->workspace();
-  const RayContext context = context_of(scene, kOblique);
+  const PreparedRay context = context_of(scene, kOblique);
   kernel->begin_ray(*workspace, *scene.medium, scene.medium->extrema(scene.medium->bounds()), context);
   SampleBlock block;
   Counters counters;

@@ -4,6 +4,7 @@
 #include <functional>
 #include <type_traits>
 
+#include "harness/kernel/estimator_traits.h"
 #include "harness/kernel/kernel.h"
 #include "harness/kernel/optical_depth.h"
 #include "media/majorants/majorant.h"
@@ -11,16 +12,6 @@
 namespace nullmark {
 
 namespace detail {
-
-template <class E, class Value>
-struct RayOf {
-  using type = Passage<Value>;
-};
-template <class E, class Value>
-requires requires { typename E::Ray; }
-struct RayOf<E, Value> {
-  using type = typename E::Ray;
-};
 
 /// Chances of the components of a sum in every segment, in proportion to their bounds along it.
 template <class Along>
@@ -38,7 +29,7 @@ void prepare_shares(Along& ray, const Medium& medium, const Ray& local) {
 
 /// What all walks of a scene share.
 template <class Value>
-struct Course {
+struct PathScene {
   const Medium* medium = nullptr;
   const Extrema* extrema = nullptr;  ///< over the whole medium
   const MajorantStructure* majorant = nullptr;
@@ -48,9 +39,9 @@ struct Course {
 };
 
 /// How long the walks of one sample may go on.  Every lookup and every flight is one event.
-class Patience {
+class EventBudget {
  public:
-  explicit Patience(const std::function<bool()>& stop) : stop_(stop) {}
+  explicit EventBudget(const std::function<bool()>& stop) : stop_(stop) {}
 
   /// A sample begins, which may take so many events.
   void start(std::uint64_t most_events) { left_ = most_events; }
@@ -83,7 +74,7 @@ struct WalkMemory {
 };
 
 /// Walks through a medium one at a time and along any ray, as paths need them: free flights, and transmittance towards lights.
-/// Immutable; one instance serves all threads.  A walk that runs out of patience returns early, and its answer must not be used.
+/// Immutable; one instance serves all threads.  A walk that runs out of budget returns early, and its answer must not be used.
 template <class Value>
 class Walker {
  public:
@@ -99,21 +90,23 @@ class Walker {
 
   /// Prepares a ray in both frames, cut to the medium, with begin 0; walks along it follow.  No allocation once the memory has
   /// grown.
-  virtual void begin(WalkMemory&, const Course<Value>&, const Ray& world, const Ray& local) const = 0;
+  virtual void begin(WalkMemory&, const PathScene<Value>&, const Ray& world, const Ray& local) const = 0;
 
   /// One free flight.  `throughput` is the weight the path has before it.
-  virtual Event<Value> fly(WalkMemory&, const Course<Value>&, const Value& throughput, Rng&, Patience&, Counters&) const = 0;
+  virtual Event<Value> fly(WalkMemory&, const PathScene<Value>&, const Value& throughput, Rng&, EventBudget&,
+                           Counters&) const = 0;
 
   /// One estimate of the transmittance.
-  virtual Value transmittance(WalkMemory&, const Course<Value>&, Rng&, Patience&, Counters&) const = 0;
+  virtual Value transmittance(WalkMemory&, const PathScene<Value>&, Rng&, EventBudget&, Counters&) const = 0;
 };
 
-/// Walks by an estimator.  An estimator whose Ray has a field `Value throughput` finds there the weight of the path so far, as
-/// history-aware collision probabilities want it [Kutz et al. 2017, Sec. 5].
+/// Walks by an estimator.  An estimator whose RayData has a field `Value throughput` finds there the weight of the path so far,
+/// as history-aware collision probabilities want it [Kutz et al. 2017, Sec. 5].
 template <template <class> class Estimator, class Value>
 class EstimatorWalker final : public Walker<Value> {
   using E = Estimator<Value>;
-  using Along = typename detail::RayOf<E, Value>::type;
+  using Traits = EstimatorTraits<E, Value>;
+  using Along = typename Traits::RayData;
   using Walk = typename E::Walk;
 
   struct State final : WalkMemory {
@@ -129,100 +122,93 @@ class EstimatorWalker final : public Walker<Value> {
   std::unique_ptr<WalkMemory> memory() const override { return std::make_unique<State>(); }
 
   bool samples_events(int channels) const override {
-    if constexpr (!requires(const Walk& walk, const Along& ray, const Flight& at) { estimator_.event(walk, ray, at); })
-      return false;
-    if constexpr (requires { estimator_.samples_events(channels); }) return estimator_.samples_events(channels);
+    if constexpr (!Traits::kEvent) return false;
+    if constexpr (Traits::kSamplesEvents) return estimator_.samples_events(channels);
     return true;
   }
 
-  bool needs_knots() const override {
-    return requires { E::kNeedsKnots; };
-  }
+  bool needs_knots() const override { return Traits::kNeedsKnots; }
 
-  bool needs_optical_depth() const override {
-    if constexpr (requires { E::kNeedsInversion; }) return true;
-    if constexpr (requires { E::kNeedsOpticalDepth; }) return E::kNeedsOpticalDepth;
-    if constexpr (requires { estimator_.needs_optical_depth(); }) return estimator_.needs_optical_depth();
-    return false;
-  }
+  bool needs_optical_depth() const override { return Traits::needs_optical_depth(estimator_); }
 
-  void begin(WalkMemory& memory, const Course<Value>& course, const Ray& world, const Ray& local) const override {
+  void begin(WalkMemory& memory, const PathScene<Value>& path_scene, const Ray& world, const Ray& local) const override {
     State& state = static_cast<State&>(memory);
     Along& ray = state.ray;
     ray.begin = world.begin;
     ray.end = world.end;
-    ray.channels = course.channels;
-    course.majorant->segments(world, local, ray.bounds);
-    ray.medium = *course.extrema;
+    ray.channels = path_scene.channels;
+    path_scene.majorant->segments(world, local, ray.bounds);
+    ray.medium = *path_scene.extrema;
     ray.majorant.start(ray.begin, ray.bounds.crossing);
     for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
     ray.exact_depth.reset();
-    if (needs_optical_depth()) ray.exact_depth = load<Value>(optical_depth(*course.medium, local).depth.data(), course.channels);
+    if (needs_optical_depth())
+      ray.exact_depth = load<Value>(optical_depth(*path_scene.medium, local).depth.data(), path_scene.channels);
     ray.knots.clear();
-    if (needs_knots()) sorted_knots(*course.medium, local, ray.knots);
-    if constexpr (requires { E::kNeedsInversion; })
+    if (needs_knots()) sorted_knots(*path_scene.medium, local, ray.knots);
+    if constexpr (Traits::kNeedsInversion)
       // Two pointers fit std::function's own memory; a ray would be allocated for every leg of a path.
-      ray.distance_at_depth = [medium = course.medium, along = &state.local](Real depth) {
+      ray.distance_at_depth = [medium = path_scene.medium, along = &state.local](Real depth) {
         return distance_at_depth(*medium, *along, depth);
       };
-    if constexpr (requires { E::kNeedsShares; }) detail::prepare_shares(ray, *course.medium, local);
-    ray.degree = course.medium->polynomial_degree();
+    if constexpr (Traits::kNeedsShares) detail::prepare_shares(ray, *path_scene.medium, local);
+    ray.degree = path_scene.medium->polynomial_degree();
     ray.entry = world.at(world.begin);
-    ray.albedo = course.albedo;
-    ray.draws_absorption = course.draws_absorption;
+    ray.albedo = path_scene.albedo;
+    ray.draws_absorption = path_scene.draws_absorption;
     state.local = local;
-    if constexpr (requires { estimator_.prepare(ray); }) estimator_.prepare(ray);
+    if constexpr (Traits::kPrepare) estimator_.prepare(ray);
   }
 
-  Event<Value> fly(WalkMemory& memory, const Course<Value>& course, const Value& throughput, Rng& rng, Patience& patience,
+  Event<Value> fly(WalkMemory& memory, const PathScene<Value>& path_scene, const Value& throughput, Rng& rng, EventBudget& budget,
                    Counters& counters) const override {
     State& state = static_cast<State&>(memory);
     if constexpr (requires { state.ray.throughput = throughput; }) state.ray.throughput = throughput;
-    [[maybe_unused]] const Flight at = walk(state, course, rng, patience, counters);
-    if constexpr (requires { estimator_.event(state.walk, state.ray, at); }) return estimator_.event(state.walk, state.ray, at);
+    [[maybe_unused]] const Flight at = walk(state, path_scene, rng, budget, counters);
+    if constexpr (Traits::kEvent) return estimator_.event(state.walk, state.ray, at);
     return {};
   }
 
-  Value transmittance(WalkMemory& memory, const Course<Value>& course, Rng& rng, Patience& patience,
+  Value transmittance(WalkMemory& memory, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget,
                       Counters& counters) const override {
     State& state = static_cast<State&>(memory);
-    if constexpr (requires { state.ray.throughput; }) state.ray.throughput = uniform_value<Value>(course.channels, 1);
-    walk(state, course, rng, patience, counters);
+    if constexpr (requires { state.ray.throughput; }) state.ray.throughput = uniform_value<Value>(path_scene.channels, 1);
+    walk(state, path_scene, rng, budget, counters);
     return estimator_.result(state.walk, state.ray);
   }
 
  private:
   /// Walks to the end and tells where that is.
-  Flight walk(State& state, const Course<Value>& course, Rng& rng, Patience& patience, Counters& counters) const {
+  Flight walk(State& state, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget, Counters& counters) const {
     Flight flight;
     flight.start(state.ray.majorant);
     estimator_.init(state.walk, state.ray, flight, rng);
     std::uint64_t lookups = 0;
-    while (!patience.exhausted() && estimator_.propose(state.walk, state.ray, flight, rng)) {
+    while (!budget.exhausted() && estimator_.propose(state.walk, state.ray, flight, rng)) {
       const Vec3 p = state.local.at(flight.position());
-      if constexpr (requires { E::kNeedsShares; }) {
+      if constexpr (Traits::kNeedsShares) {
         const int component = estimator_.component(state.walk);
-        state.extinction[0] = course.medium->component_extinction(component, p) / state.ray.shares[flight.piece()][component];
+        state.extinction[0] = path_scene.medium->component_extinction(component, p) / state.ray.shares[flight.piece()][component];
       } else {
-        course.medium->extinction({&p.x(), &p.y(), &p.z(), 1}, state.extinction.data());
+        path_scene.medium->extinction({&p.x(), &p.y(), &p.z(), 1}, state.extinction.data());
       }
       ++lookups;
-      const Value extinction = load<Value>(state.extinction.data(), course.channels);
+      const Value extinction = load<Value>(state.extinction.data(), path_scene.channels);
       audit(state.ray, flight, extinction, counters);
       estimator_.consume(state.walk, state.ray, flight, extinction, rng);
-      patience.spend();
+      budget.spend();
     }
     counters.lookups += lookups;
-    if constexpr (!requires { E::kIgnoresMajorant; }) {
+    if constexpr (!Traits::kIgnoresMajorant) {
       counters.null_collisions += lookups;
-      if constexpr (requires { estimator_.real_collisions(state.walk, state.ray); })
+      if constexpr (Traits::kRealCollisions)
         counters.null_collisions -= static_cast<std::uint64_t>(estimator_.real_collisions(state.walk, state.ray));
     }
     return flight;
   }
 
   static void audit(const Along& ray, const Flight& at, const Value& extinction, Counters& counters) {
-    if constexpr (!requires { E::kIgnoresMajorant; }) {
+    if constexpr (!Traits::kIgnoresMajorant) {
       const Real bound = ray.majorant.rate(at.piece()), most = largest(extinction);
       if (exceeds(most, bound)) {
         ++counters.violations;

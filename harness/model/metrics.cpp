@@ -65,159 +65,180 @@ std::optional<Real> sample_rmse_theory(const CellRecord& record) {
   return std::sqrt(*rmse * *rmse + *variance * (1 - 1 / static_cast<Real>(record.cell.samples_per_ray)));
 }
 
-/// What a metric that is theory's predicts: "variance" of "variance_theory".
-std::string_view predicted_metric(std::string_view name) {
-  if (name == "lookups_theory") return "lookups_per_sample";
-  constexpr std::string_view kEnd = "_theory";
-  return name.ends_with(kEnd) ? name.substr(0, name.size() - kEnd.size()) : std::string_view();
+using Maybe = std::optional<Real>;
+
+Maybe product(const Maybe& a, const Maybe& b) { return a && b ? Maybe(*a * *b) : std::nullopt; }
+
+/// Of counts that only cells which ran have.
+Maybe if_run(const CellRecord& record, Real value) { return record.status == Status::ok ? Maybe(value) : std::nullopt; }
+
+Real samples_of(const CellRecord& record) { return static_cast<Real>(record.samples); }
+
+/// Errors of channels on one walk go together: the average's is at most their average.
+template <class F>
+Maybe channel_average_of(const CellRecord& record, const F& of_channel) {
+  Real sum = 0;
+  for (const ChannelRecord& channel : record.channel) {
+    const Maybe one = of_channel(channel);
+    if (!one) return std::nullopt;
+    sum += *one;
+  }
+  return record.channel.empty() ? std::nullopt : Maybe(sum / static_cast<Real>(record.channel.size()));
+}
+
+Maybe error_of_mean(const CellRecord& record, const ChannelRecord& channel) {
+  const Maybe variance = channel.variance ? channel.variance : channel.variance_theory;
+  return variance ? Maybe(std::sqrt(*variance / samples_of(record))) : std::nullopt;
+}
+
+/// Pooled over rays that differ, the kurtosis is larger than that of any law with the rays' mean variance.
+Maybe relative_error_of_variance(const CellRecord& record, const ChannelRecord& channel) {
+  if (channel.variance == Real{0}) return 0;
+  return channel.kurtosis ? Maybe(std::sqrt(std::max<Real>(0, *channel.kurtosis - 1) / samples_of(record))) : std::nullopt;
+}
+
+Maybe error_of_variance(const CellRecord& record, const ChannelRecord& channel) {
+  return product(relative_error_of_variance(record, channel), channel.variance);
+}
+
+Maybe mean_error(const CellRecord& record) {
+  return channel_average_of(record, [&](const ChannelRecord& channel) { return error_of_mean(record, channel); });
+}
+Maybe variance_error(const CellRecord& record) {
+  return channel_average_of(record, [&](const ChannelRecord& channel) { return error_of_variance(record, channel); });
+}
+Maybe lookups_error(const CellRecord& record) {
+  return record.lookups_variance ? Maybe(std::sqrt(*record.lookups_variance / samples_of(record))) : std::nullopt;
+}
+Maybe variance_x_lookups_error(const CellRecord& record) {
+  const Maybe variance = variance_error(record), lookups = lookups_error(record);
+  const Maybe v = channel_average(record, &ChannelRecord::variance), n = record.lookups_per_sample;
+  return variance && lookups && v && n ? Maybe(std::hypot(*variance * *n, *lookups * *v)) : std::nullopt;
+}
+Maybe sample_rmse_error(const CellRecord& record) {
+  const Maybe rmse = sample_rmse(record), relative = channel_average_of(record, [&](const ChannelRecord&channel) {
+                                            return relative_error_of_variance(record, channel);
+                                          });
+  return rmse && relative ? Maybe(*rmse * *relative / 2) : std::nullopt;
+}
+/// Of R squared normal errors whose variances differ: sum of sigma^4 <= R kurtosis (mean sigma^2)^2.
+Maybe rmse_error(const CellRecord& record) {
+  const Maybe rmse = channel_root_mean_square(record, &ChannelRecord::rmse);
+  if (rmse == Real{0}) return 0;
+  const Maybe factor = channel_average_of(record, [](const ChannelRecord& channel) { return channel.kurtosis; });
+  return rmse && factor ? Maybe(*rmse * std::sqrt(std::max<Real>(1, *factor) / (2 * static_cast<Real>(record.rays))))
+                        : std::nullopt;
+}
+Maybe exact(const CellRecord&) { return 0; }
+
+/// A metric: its value in a record, what theory says of it, and its standard error; null where there is none.
+struct Metric {
+  using Value = Maybe (*)(const CellRecord&);
+  std::string name;
+  Value measured = nullptr, theory = nullptr, error = nullptr;
+  std::string theory_name{};  ///< of a metric of its own that is the theory; empty: none is offered
+};
+
+const std::vector<Metric>& metrics() {
+  using Record = const CellRecord&;
+  using Channel = ChannelRecord;
+  static const std::vector<Metric> kMetrics = {
+      {"mean", [](Record r) { return channel_average(r, &Channel::mean); },
+       [](Record r) { return channel_average(r, &Channel::reference); }, mean_error},
+      {"bias", [](Record r) { return channel_average(r, &Channel::bias); },
+       [](Record r) { return channel_average(r, &Channel::bias_theory); }, mean_error, "bias_theory"},
+      {"rmse", [](Record r) { return channel_root_mean_square(r, &Channel::rmse); },
+       [](Record r) { return channel_root_mean_square(r, &Channel::rmse_theory); }, rmse_error},
+      {"variance", [](Record r) { return channel_average(r, &Channel::variance); },
+       [](Record r) { return channel_average(r, &Channel::variance_theory); }, variance_error, "variance_theory"},
+      {"kurtosis", [](Record r) { return channel_average(r, &Channel::kurtosis); }},
+      {"relative_variance", [](Record r) { return channel_average(r, &Channel::relative_variance); }},
+      {"ns_per_sample", [](Record r) { return r.time ? Maybe(r.time->ns_per_sample) : std::nullopt; }},
+      {"ns_per_lookup", [](Record r) -> Maybe { return r.time ? Maybe(r.time->ns_per_lookup) : std::nullopt; }},
+      {"lookups_per_sample", [](Record r) -> Maybe { return r.lookups_per_sample; },
+       [](Record r) -> Maybe { return r.lookups_theory; }, lookups_error, "lookups_theory"},
+      {"weight_mean", [](Record r) { return weight(r, &Channel::mean); }, [](Record r) { return weight(r, &Channel::reference); },
+       [](Record r) { return weight(r) ? error_of_mean(r, *weight(r)) : std::nullopt; }},
+      {"weight_variance", [](Record r) { return weight(r, &Channel::variance); },
+       [](Record r) { return weight(r, &Channel::variance_theory); },
+       [](Record r) { return weight(r) ? error_of_variance(r, *weight(r)) : std::nullopt; }},
+      {"weighted_cost", [](Record r) { return weighted_cost(r.lookups_per_sample, weight(r, &Channel::variance)); },
+       [](Record r) { return weighted_cost(r.lookups_theory, weight(r, &Channel::variance_theory)); }, nullptr,
+       "weighted_cost_theory"},
+      {"draws_per_sample", [](Record r) -> Maybe { return r.draws_per_sample; }},
+      {"variance_x_ns",
+       [](Record r) {
+         return product(channel_average(r, &Channel::variance), r.time ? Maybe(r.time->ns_per_sample) : std::nullopt);
+       }},
+      {"variance_x_lookups", [](Record r) { return product(channel_average(r, &Channel::variance), r.lookups_per_sample); },
+       [](Record r) { return product(channel_average(r, &Channel::variance_theory), r.lookups_theory); },
+       variance_x_lookups_error, "variance_x_lookups_theory"},
+      {"sample_rmse", sample_rmse, sample_rmse_theory, sample_rmse_error, "sample_rmse_theory"},
+      {"samples_per_ray", [](Record r) { return if_run(r, static_cast<Real>(r.cell.samples_per_ray)); }, nullptr, exact},
+      {"largest_sample", [](Record r) -> Maybe { return r.largest_sample; }, nullptr, exact},
+      {"majorant_violations", [](Record r) { return if_run(r, static_cast<Real>(r.majorant_violations)); }, nullptr, exact},
+      {"majorant_cells", [](Record r) { return r.structure ? Maybe(static_cast<Real>(r.structure->cells)) : std::nullopt; },
+       nullptr, exact},
+  };
+  return kMetrics;
+}
+
+const Metric* metric_named(std::string_view name) {
+  for (const Metric& one : metrics())
+    if (one.name == name) return &one;
+  return nullptr;
+}
+
+/// The metric of which a name is the theory; null where it is none's.
+const Metric* predicted_metric(std::string_view name) {
+  for (const Metric& one : metrics())
+    if (!one.theory_name.empty() && one.theory_name == name) return &one;
+  return nullptr;
+}
+
+/// Names of metrics that fit, then of their theories.
+template <class Fits>
+std::vector<std::string> names_of(const Fits& fits) {
+  std::vector<std::string> names;
+  for (const Metric& one : metrics())
+    if (fits(one)) names.push_back(one.name);
+  for (const Metric& one : metrics())
+    if (!one.theory_name.empty()) names.push_back(one.theory_name);
+  return names;
 }
 
 }  // namespace
 
+int outputs_of(const CellRecord& record) {
+  return record.outputs.empty() ? record.channels : static_cast<int>(record.outputs.size());
+}
+
 const std::vector<std::string>& metric_names() {
-  static const std::vector<std::string> kNames = {"mean",
-                                                  "bias",
-                                                  "rmse",
-                                                  "variance",
-                                                  "kurtosis",
-                                                  "relative_variance",
-                                                  "ns_per_sample",
-                                                  "ns_per_lookup",
-                                                  "lookups_per_sample",
-                                                  "weight_mean",
-                                                  "weight_variance",
-                                                  "weighted_cost",
-                                                  "draws_per_sample",
-                                                  "variance_x_ns",
-                                                  "variance_x_lookups",
-                                                  "sample_rmse",
-                                                  "samples_per_ray",
-                                                  "largest_sample",
-                                                  "majorant_violations",
-                                                  "majorant_cells",
-                                                  "variance_theory",
-                                                  "lookups_theory",
-                                                  "bias_theory",
-                                                  "variance_x_lookups_theory",
-                                                  "sample_rmse_theory",
-                                                  "weighted_cost_theory"};
+  static const std::vector<std::string> kNames = names_of([](const Metric&) { return true; });
   return kNames;
 }
 
 const std::vector<std::string>& claimable_metric_names() {
-  static const std::vector<std::string> kNames = [] {
-    const std::set<std::string_view> without_error = {"kurtosis",      "relative_variance", "ns_per_sample", "ns_per_lookup",
-                                                      "weighted_cost", "draws_per_sample",  "variance_x_ns"};
-    std::vector<std::string> names = metric_names();
-    std::erase_if(names, [&](const std::string& name) { return without_error.count(name) > 0; });
-    return names;
-  }();
+  static const std::vector<std::string> kNames = names_of([](const Metric& one) { return one.error != nullptr; });
   return kNames;
 }
 
 std::optional<Real> metric(const CellRecord& record, std::string_view name) {
-  if (const std::string_view of = predicted_metric(name); !of.empty()) return metric_theory(record, of);
-  if (name == "mean") return channel_average(record, &ChannelRecord::mean);
-  if (name == "bias") return channel_average(record, &ChannelRecord::bias);
-  if (name == "rmse") return channel_root_mean_square(record, &ChannelRecord::rmse);
-  if (name == "variance") return channel_average(record, &ChannelRecord::variance);
-  if (name == "kurtosis") return channel_average(record, &ChannelRecord::kurtosis);
-  if (name == "relative_variance") return channel_average(record, &ChannelRecord::relative_variance);
-  if (name == "lookups_per_sample") return record.lookups_per_sample;
-  if (name == "weight_mean") return weight(record, &ChannelRecord::mean);
-  if (name == "weight_variance") return weight(record, &ChannelRecord::variance);
-  if (name == "weighted_cost") return weighted_cost(record.lookups_per_sample, weight(record, &ChannelRecord::variance));
-  if (name == "variance_x_ns") {
-    const std::optional<Real> variance = channel_average(record, &ChannelRecord::variance);
-    return variance && record.time ? std::optional(*variance * record.time->ns_per_sample) : std::nullopt;
-  }
-  if (name == "variance_x_lookups") {
-    const std::optional<Real> variance = channel_average(record, &ChannelRecord::variance);
-    return variance && record.lookups_per_sample ? std::optional(*variance * *record.lookups_per_sample) : std::nullopt;
-  }
-  if (name == "sample_rmse") return sample_rmse(record);
-  if (name == "samples_per_ray" && record.status == Status::ok) return static_cast<Real>(record.cell.samples_per_ray);
-  if (name == "largest_sample") return record.largest_sample;
-  if (name == "majorant_violations" && record.status == Status::ok) return static_cast<Real>(record.majorant_violations);
-  if (name == "majorant_cells" && record.structure) return static_cast<Real>(record.structure->cells);
-  if (name == "draws_per_sample") return record.draws_per_sample;
-  if (name == "ns_per_sample" && record.time) return record.time->ns_per_sample;
-  if (name == "ns_per_lookup" && record.time) return record.time->ns_per_lookup;
-  return std::nullopt;
+  if (const Metric* of = predicted_metric(name)) return of->theory(record);
+  const Metric* one = metric_named(name);
+  return one ? one->measured(record) : std::nullopt;
 }
 
 std::optional<Real> metric_theory(const CellRecord& record, std::string_view name) {
-  if (name == "mean") return channel_average(record, &ChannelRecord::reference);
-  if (name == "rmse") return channel_root_mean_square(record, &ChannelRecord::rmse_theory);
-  if (name == "variance") return channel_average(record, &ChannelRecord::variance_theory);
-  if (name == "weight_mean") return weight(record, &ChannelRecord::reference);
-  if (name == "weight_variance") return weight(record, &ChannelRecord::variance_theory);
-  if (name == "weighted_cost") return weighted_cost(record.lookups_theory, weight(record, &ChannelRecord::variance_theory));
-  if (name == "lookups_per_sample") return record.lookups_theory;
-  if (name == "bias") return channel_average(record, &ChannelRecord::bias_theory);
-  if (name == "sample_rmse") return sample_rmse_theory(record);
-  if (name == "variance_x_lookups") {
-    const std::optional<Real> variance = channel_average(record, &ChannelRecord::variance_theory);
-    return variance && record.lookups_theory ? std::optional(*variance * *record.lookups_theory) : std::nullopt;
-  }
-  return std::nullopt;
+  const Metric* one = metric_named(name);
+  return one && one->theory ? one->theory(record) : std::nullopt;
 }
 
 std::optional<Real> standard_error(const CellRecord& record, std::string_view name) {
-  const auto samples = static_cast<Real>(record.samples);
-  if (record.status != Status::ok || !(samples > 0)) return std::nullopt;
-  if (!predicted_metric(name).empty()) return 0;
-  // Errors of channels on one walk go together: the average's is at most their average.
-  const auto average = [&](auto&& of_channel) -> std::optional<Real> {
-    Real sum = 0;
-    for (const ChannelRecord& channel : record.channel) {
-      const std::optional<Real> one = of_channel(channel);
-      if (!one) return std::nullopt;
-      sum += *one;
-    }
-    return record.channel.empty() ? std::nullopt : std::optional(sum / static_cast<Real>(record.channel.size()));
-  };
-  const auto of_mean = [&](const ChannelRecord& channel) -> std::optional<Real> {
-    const std::optional<Real> variance = channel.variance ? channel.variance : channel.variance_theory;
-    return variance ? std::optional(std::sqrt(*variance / samples)) : std::nullopt;
-  };
-  // Pooled over rays that differ, the kurtosis is larger than that of any law with the rays' mean variance.
-  const auto relative_of_variance = [&](const ChannelRecord& channel) -> std::optional<Real> {
-    if (channel.variance == Real{0}) return 0;
-    return channel.kurtosis ? std::optional(std::sqrt(std::max<Real>(0, *channel.kurtosis - 1) / samples)) : std::nullopt;
-  };
-  const auto of_variance = [&](const ChannelRecord& channel) -> std::optional<Real> {
-    const std::optional<Real> relative = relative_of_variance(channel);
-    return relative && channel.variance ? std::optional(*relative * *channel.variance) : std::nullopt;
-  };
-  const auto of_lookups = [&]() -> std::optional<Real> {
-    return record.lookups_variance ? std::optional(std::sqrt(*record.lookups_variance / samples)) : std::nullopt;
-  };
-  if (name == "mean" || name == "bias") return average(of_mean);
-  if (name == "variance") return average(of_variance);
-  if (name == "weight_mean") return weight(record) ? of_mean(*weight(record)) : std::nullopt;
-  if (name == "weight_variance") return weight(record) ? of_variance(*weight(record)) : std::nullopt;
-  if (name == "lookups_per_sample") return of_lookups();
-  if (name == "variance_x_lookups") {
-    const std::optional<Real> variance = average(of_variance), lookups = of_lookups();
-    const std::optional<Real> v = metric(record, "variance"), n = record.lookups_per_sample;
-    return variance && lookups && v && n ? std::optional(std::hypot(*variance * *n, *lookups * *v)) : std::nullopt;
-  }
-  if (name == "sample_rmse") {
-    const std::optional<Real> rmse = sample_rmse(record), relative = average(relative_of_variance);
-    return rmse && relative ? std::optional(*rmse * *relative / 2) : std::nullopt;
-  }
-  if (name == "rmse") {
-    // Of R squared normal errors whose variances differ: sum of sigma^4 <= R kurtosis (mean sigma^2)^2.
-    const std::optional<Real> rmse = metric(record, "rmse");
-    if (rmse == Real{0}) return 0;
-    const std::optional<Real> factor = average([](const ChannelRecord& channel) { return channel.kurtosis; });
-    return rmse && factor ? std::optional(*rmse * std::sqrt(std::max<Real>(1, *factor) / (2 * static_cast<Real>(record.rays))))
-                          : std::nullopt;
-  }
-  if (name == "samples_per_ray" || name == "largest_sample" || name == "majorant_violations" || name == "majorant_cells")
-    return 0;
-  return std::nullopt;
+  if (record.status != Status::ok || record.samples == 0) return std::nullopt;
+  if (predicted_metric(name)) return 0;
+  const Metric* one = metric_named(name);
+  return one && one->error ? one->error(record) : std::nullopt;
 }
 
 const std::optional<Real>& best_variance(const ChannelRecord& channel) {

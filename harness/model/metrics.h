@@ -12,6 +12,9 @@ namespace nullmark {
 /// Above this relative variance a sample variance tells little; tables show the theory instead, marked.
 inline constexpr Real kHeavyTail = 100;
 
+/// Numbers that one sample of a cell gives: those of its quantity, else one a channel.
+int outputs_of(const CellRecord& record);
+
 /// What a table may show.
 const std::vector<std::string>& metric_names();
 

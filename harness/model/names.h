@@ -4,21 +4,21 @@
 #include <string>
 #include <vector>
 
-#include "estimators/estimator.h"
+#include "estimators/walk/quantity.h"
 #include "harness/model/record.h"
 
 namespace nullmark {
 
 /// The words of configurations, results and tables.
-inline const char* to_string(Claim claim) {
+inline const char* to_string(Guarantee claim) {
   switch (claim) {
-    case Claim::exact:
+    case Guarantee::exact:
       return "exact";
-    case Claim::unbiased:
+    case Guarantee::unbiased:
       return "unbiased";
-    case Claim::consistent:
+    case Guarantee::consistent:
       return "consistent";
-    case Claim::biased:
+    case Guarantee::biased:
       break;
   }
   return "biased";

@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "estimators/estimator.h"
+#include "estimators/walk/quantity.h"
 #include "harness/model/published_claim.h"
 
 namespace nullmark {
@@ -84,9 +84,9 @@ enum class LawPolicy { undecided, always, never };
 enum class Tolerate { nothing, epsilon };
 
 /// What a cell's verdict must prove and what that may cost.
-struct GateSpec {
+struct VerdictSpec {
   bool enabled = true;
-  std::optional<Real> epsilon{};  ///< relative to the mean reference; left out: by the optical depth, see gate.cpp
+  std::optional<Real> epsilon{};  ///< relative to the mean reference; left out: by the optical depth, see test_plan.cpp
   /// Where undecided; 0: samples_per_ray, and up to four times as many where they were enough by the plan.
   std::uint64_t max_samples_per_ray = 0;
   std::optional<Real> max_lookups_per_ray{};  ///< expected lookups that all samples of a ray may cost
@@ -94,15 +94,15 @@ struct GateSpec {
   bool all_samples = false;  ///< drawn while undecided, also where the plan knows that they are too few
   LawPolicy laws = LawPolicy::undecided;
 
-  bool operator==(const GateSpec&) const = default;
+  bool operator==(const VerdictSpec&) const = default;
 };
 
 /// Error levels of a whole configuration.
-struct GateLevels {
+struct ErrorRates {
   Real alpha = 1e-4;       ///< chance of even one false FAIL among all mean tests, and the same among all lookup tests
   Real alpha_pass = 1e-3;  ///< chance of a false PASS, of each test
 
-  bool operator==(const GateLevels&) const = default;
+  bool operator==(const ErrorRates&) const = default;
 };
 
 /// A mean that the configuration gives, where none can be computed here.
@@ -131,7 +131,7 @@ struct Cell {
   bool own_streams = false;  ///< streams keyed by the estimator too, instead of common random numbers
   bool images = false;
   Real image_maximum = 1;  ///< value shown white
-  GateSpec gate{};
+  VerdictSpec verdict{};
   std::optional<GivenReference> reference{};
 };
 
@@ -168,7 +168,7 @@ struct Plan {
   std::vector<Component> ray_sets;
   std::vector<Cell> cells;
   TimingPlan timing;
-  GateLevels levels;
+  ErrorRates error_rates;
   std::vector<Table> tables;
   std::vector<PublishedClaim> claims;
   std::map<std::string, std::string> credits;  ///< author and licence, by a data file's name

@@ -155,7 +155,7 @@ struct CellRecord {
 
 /// One run: what the results file holds.
 struct RunRecord {
-  static constexpr int kSchema = 1;
+  static constexpr const char* kVersion = "results/2";
   std::string name;
   std::string config_text;
   std::map<std::string, std::string> provenance;  ///< values are JSON texts

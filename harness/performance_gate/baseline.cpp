@@ -63,27 +63,27 @@ void refuse_repeated_names(const Counts& counts) {
       throw InputError(fmt::format("{}: cell \"{}\" is there twice; expected every name once", counts.source, cell.name));
 }
 
-CellCounts read_cell_counts(const Place& place) {
+CellCounts read_cell_counts(const JsonNode& node) {
   CellCounts cell;
-  const auto whole = [&](const char* key) { return place[key].unsigned_integer(0); };
-  const auto real = [&](const char* key) { return place.has(key) ? std::optional(place[key].number()) : std::nullopt; };
-  cell.name = place["name"].string();
-  cell.id = place["id"].string();
-  cell.setting = place["setting"].string();
-  cell.samples = place["samples"].unsigned_integer(1);
+  const auto whole = [&](const char* key) { return node[key].unsigned_integer(0); };
+  const auto real = [&](const char* key) { return node.has(key) ? std::optional(node[key].number()) : std::nullopt; };
+  cell.name = node["name"].string();
+  cell.id = node["id"].string();
+  cell.setting = node["setting"].string();
+  cell.samples = node["samples"].unsigned_integer(1);
   cell.lookups = whole("lookups");
   cell.draws = whole("draws");
   cell.null_collisions = whole("null_collisions");
   cell.majorant_violations = whole("majorant_violations");
   cell.lookups_variance = real("lookups_variance");
   cell.lookups_theory = real("lookups_theory");
-  if (place.has("instructions")) cell.instructions = whole("instructions");
-  if (place.has("instruction_history"))
-    for (const Place& change : place["instruction_history"].elements()) cell.instruction_history.push_back(change.number());
+  if (node.has("instructions")) cell.instructions = whole("instructions");
+  if (node.has("instruction_history"))
+    for (const JsonNode& change : node["instruction_history"].elements()) cell.instruction_history.push_back(change.number());
   return cell;
 }
 
-Counts read_baseline(const Place& top) {
+Counts read_baseline(const JsonNode& top) {
   if (top[kSchemaKey].unsigned_integer(0) != kSchema)
     top[kSchemaKey].expected(fmt::format("{}, the schema this program reads", kSchema));
   Counts counts;
@@ -91,7 +91,7 @@ Counts read_baseline(const Place& top) {
   counts.baseline = true;
   counts.name = top["name"].string();
   counts.config_hash = top["config_hash"].string();
-  const Place build = top["build"];
+  const JsonNode build = top["build"];
   for (const auto& [key, member] : {std::pair{"compiler", &BuildKey::compiler},
                                     {"flags", &BuildKey::flags},
                                     {"march", &BuildKey::march},
@@ -99,7 +99,7 @@ Counts read_baseline(const Place& top) {
                                     {"libc", &BuildKey::libc},
                                     {"cpu", &BuildKey::cpu}})
     counts.build.*member = build[key].string();
-  for (const Place& cell : top["cells"].elements()) counts.cells.push_back(read_cell_counts(cell));
+  for (const JsonNode& cell : top["cells"].elements()) counts.cells.push_back(read_cell_counts(cell));
   return counts;
 }
 
@@ -154,7 +154,7 @@ Counts counts_of(const RunRecord& run, const std::string& file) {
 Counts read_counts(const std::string& file) {
   const std::string text = read_file(file);
   const Json json = parse_json(text, file);
-  const Place top(json, file);
+  const JsonNode top(json, file);
   top.expect_object();
   if (!top.has(kSchemaKey)) return counts_of(read_results(text, file), file);
   Counts counts = read_baseline(top);

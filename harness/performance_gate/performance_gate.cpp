@@ -28,10 +28,10 @@ Real per_sample(std::uint64_t count, const CellCounts& cell) {
 }
 
 /// Where an exactly known change stands to a threshold.
-Finding judged(Real change, Real threshold) {
-  if (change > threshold) return Finding::regression;
-  if (change < -threshold) return Finding::better;
-  return change == 0 ? Finding::same : Finding::changed;
+GateResult judged(Real change, Real threshold) {
+  if (change > threshold) return GateResult::regression;
+  if (change < -threshold) return GateResult::better;
+  return change == 0 ? GateResult::same : GateResult::changed;
 }
 
 /// Squared relative standard error of a cell's mean lookups; nothing where it cannot be told.
@@ -61,7 +61,7 @@ class Comparison {
   }
 
   void add_not_compared(const std::string& cell, Tier tier, const std::string& metric, const std::string& note) {
-    rows.push_back({cell, tier, metric, Finding::not_compared, {}, {}, {}, {}, {}, 0, "", note});
+    rows.push_back({cell, tier, metric, GateResult::not_compared, {}, {}, {}, {}, {}, 0, "", note});
   }
 
   std::vector<GateRow> rows;
@@ -81,10 +81,10 @@ class Comparison {
     row.low = std::expm1(middle - half);
     row.high = std::expm1(middle + half);
     row.confidence = level_;
-    row.finding = *row.low > row.threshold                                   ? Finding::regression
-                  : *row.high < -row.threshold                               ? Finding::better
-                  : *row.low >= -row.threshold && *row.high <= row.threshold ? Finding::same
-                                                                             : Finding::undecided;
+    row.finding = *row.low > row.threshold                                   ? GateResult::regression
+                  : *row.high < -row.threshold                               ? GateResult::better
+                  : *row.low >= -row.threshold && *row.high <= row.threshold ? GateResult::same
+                                                                             : GateResult::undecided;
   }
 
   void counts(const CellCounts& before, const CellCounts& after) {
@@ -105,8 +105,8 @@ class Comparison {
         if (error && other)
           widen(one, *error + *other);
         else
-          one.finding = Finding::undecided;
-        if (one.finding == Finding::undecided || one.finding == Finding::same) one.finding = Finding::changed;
+          one.finding = GateResult::undecided;
+        if (one.finding == GateResult::undecided || one.finding == GateResult::same) one.finding = GateResult::changed;
       }
       rows.push_back(std::move(one));
     };
@@ -115,7 +115,7 @@ class Comparison {
     const auto tell = [&](const char* metric, std::uint64_t CellCounts::*count) {
       if (before.*count == after.*count) return;
       rows.push_back(row(after, Tier::counts, metric, per_sample(before.*count, before), per_sample(after.*count, after), 0));
-      rows.back().finding = Finding::changed;
+      rows.back().finding = GateResult::changed;
     };
     tell("null collisions", &CellCounts::null_collisions);
     tell("majorant violations", &CellCounts::majorant_violations);
@@ -132,7 +132,7 @@ class Comparison {
     if (before.lookups_theory && after.lookups_theory) {
       GateRow one =
           row(after, Tier::expected, "expected lookups", *before.lookups_theory, *after.lookups_theory, kExpectedThreshold);
-      if (std::abs(*one.change) <= kSameTheory) one.finding = Finding::same;
+      if (std::abs(*one.change) <= kSameTheory) one.finding = GateResult::same;
       rows.push_back(std::move(one));
     }
     if (exact_ && before.lookups == after.lookups) return;
@@ -175,7 +175,7 @@ class Comparison {
     }
     GateRow one = row(after, Tier::instructions, "instructions", per_sample(*before.instructions, before),
                       per_sample(*after.instructions, after), instruction_threshold(before.instruction_history));
-    if (one.finding == Finding::changed) one.finding = Finding::same;
+    if (one.finding == GateResult::changed) one.finding = GateResult::same;
     rows.push_back(std::move(one));
   }
 
@@ -200,19 +200,19 @@ std::string BuildKey::text() const {
   return fmt::format("{}, {} ({}{}), {}, {}", compiler, march, simd, cpu.empty() ? "" : ", " + cpu, libc, flags);
 }
 
-std::size_t PerformanceReport::count(Tier tier, Finding finding) const {
+std::size_t PerformanceReport::count(Tier tier, GateResult finding) const {
   return static_cast<std::size_t>(
       std::count_if(rows.begin(), rows.end(), [&](const GateRow& row) { return row.tier == tier && row.finding == finding; }));
 }
 
-std::size_t PerformanceReport::count(Finding finding) const {
+std::size_t PerformanceReport::count(GateResult finding) const {
   return static_cast<std::size_t>(
       std::count_if(rows.begin(), rows.end(), [&](const GateRow& row) { return row.finding == finding; }));
 }
 
 ExitCode PerformanceReport::exit() const {
-  if (count(Finding::regression) > 0) return ExitCode::regression;
-  return count(Finding::not_compared) == rows.size() ? ExitCode::nothing_ran : ExitCode::ok;
+  if (count(GateResult::regression) > 0) return ExitCode::regression;
+  return count(GateResult::not_compared) == rows.size() ? ExitCode::nothing_ran : ExitCode::ok;
 }
 
 Real instruction_threshold(std::vector<Real> history) {
@@ -263,23 +263,23 @@ const char* to_string(Tier tier) {
   return "wall time";
 }
 
-const char* to_string(Finding finding) {
+const char* to_string(GateResult finding) {
   switch (finding) {
-    case Finding::same:
+    case GateResult::same:
       return "same";
-    case Finding::changed:
+    case GateResult::changed:
       return "changed";
-    case Finding::better:
+    case GateResult::better:
       return "better";
-    case Finding::undecided:
+    case GateResult::undecided:
       return "undecided";
-    case Finding::regression:
+    case GateResult::regression:
       return "REGRESSION";
-    case Finding::slower:
+    case GateResult::slower:
       return "slower (advisory)";
-    case Finding::noisy:
+    case GateResult::noisy:
       return "noisy";
-    case Finding::not_compared:
+    case GateResult::not_compared:
       break;
   }
   return "not compared";

@@ -48,7 +48,7 @@ struct Counts {
 /// See performance_gate.md for what each tier proves.
 enum class Tier { counts = 1, expected = 2, instructions = 3, wall_time = 4 };
 
-enum class Finding {
+enum class GateResult {
   same,          ///< equal counts, or no difference beyond the threshold, which is proven
   changed,       ///< other counts than exactly those; no regression beyond the threshold is proven
   better,        ///< an improvement beyond the threshold is proven
@@ -64,7 +64,7 @@ struct GateRow {
   std::string cell;
   Tier tier = Tier::counts;
   std::string metric;  ///< what was compared, per sample
-  Finding finding = Finding::same;
+  GateResult finding = GateResult::same;
   std::optional<Real> before, after;
   std::optional<Real> change, low, high;  ///< low to high: interval of the change; low = high where it is exact
   Real threshold = 0;
@@ -77,8 +77,8 @@ struct PerformanceReport {
   std::vector<GateRow> rows;
   std::vector<std::string> notes;
 
-  std::size_t count(Tier tier, Finding finding) const;
-  std::size_t count(Finding finding) const;
+  std::size_t count(Tier tier, GateResult finding) const;
+  std::size_t count(GateResult finding) const;
   /// 4 where a regression is proven, else 5 where nothing could be compared, else 0.
   ExitCode exit() const;
 };
@@ -98,6 +98,6 @@ Real instruction_threshold(std::vector<Real> history);
 PerformanceReport compare_counts(const Counts& before, const Counts& after, std::optional<Real> threshold = {});
 
 const char* to_string(Tier tier);
-const char* to_string(Finding finding);
+const char* to_string(GateResult finding);
 
 }  // namespace nullmark

@@ -56,17 +56,17 @@ Counts with_more_lookups(Real share) {
   return counts;
 }
 
-Finding finding(const PerformanceReport& report, Tier tier, const std::string& metric) {
+GateResult finding(const PerformanceReport& report, Tier tier, const std::string& metric) {
   for (const GateRow& row : report.rows)
     if (row.tier == tier && row.metric == metric) return row.finding;
   ADD_FAILURE() << "no row for " << metric;
-  return Finding::not_compared;
+  return GateResult::not_compared;
 }
 
 TEST(PerformanceGate, EqualCountsAreTheSame) {
   const PerformanceReport report = compare_counts(example(), example());
   EXPECT_EQ(report.rows.size(), 3u);
-  EXPECT_EQ(report.count(Finding::same), 3u);
+  EXPECT_EQ(report.count(GateResult::same), 3u);
   EXPECT_EQ(report.exit(), ExitCode::ok);
 }
 
@@ -74,13 +74,13 @@ TEST(PerformanceGate, MoreDrawsOnTheSameWalksAreARegressionHoweverFew) {
   Counts after = example();
   ++only(after).draws;
   PerformanceReport report = compare_counts(example(), after);
-  EXPECT_EQ(finding(report, Tier::counts, "draws"), Finding::regression);
+  EXPECT_EQ(finding(report, Tier::counts, "draws"), GateResult::regression);
   EXPECT_EQ(report.rows.at(0).confidence, "exact");
   EXPECT_EQ(report.exit(), ExitCode::regression);
   EXPECT_EQ(compare_counts(example(), after, 0.001).exit(), ExitCode::ok);
   only(after).draws -= 2;
   report = compare_counts(example(), after);
-  EXPECT_EQ(finding(report, Tier::counts, "draws"), Finding::better);
+  EXPECT_EQ(finding(report, Tier::counts, "draws"), GateResult::better);
   EXPECT_EQ(report.exit(), ExitCode::ok);
 }
 
@@ -88,28 +88,28 @@ TEST(PerformanceGate, OtherWalksAreChangedUnlessChanceCannotDoIt) {
   // Standard error of the ratio .14 %.
   for (const Real share : {0.0001, 0.001, -0.001, -0.0001}) {
     const PerformanceReport report = compare_counts(example(), with_more_lookups(share));
-    EXPECT_EQ(finding(report, Tier::counts, "lookups"), Finding::changed) << share;
-    EXPECT_EQ(finding(report, Tier::counts, "draws"), Finding::changed) << share;
+    EXPECT_EQ(finding(report, Tier::counts, "lookups"), GateResult::changed) << share;
+    EXPECT_EQ(finding(report, Tier::counts, "draws"), GateResult::changed) << share;
     EXPECT_EQ(report.exit(), ExitCode::ok) << share;
   }
   const PerformanceReport report = compare_counts(example(), with_more_lookups(0.03));
-  EXPECT_EQ(finding(report, Tier::counts, "lookups"), Finding::regression);
-  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), Finding::regression);
+  EXPECT_EQ(finding(report, Tier::counts, "lookups"), GateResult::regression);
+  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), GateResult::regression);
   EXPECT_EQ(report.exit(), ExitCode::regression);
   EXPECT_EQ(compare_counts(example(), with_more_lookups(0.03), 0.05).exit(), ExitCode::ok);
-  EXPECT_EQ(finding(compare_counts(example(), with_more_lookups(-0.03)), Tier::counts, "lookups"), Finding::better);
+  EXPECT_EQ(finding(compare_counts(example(), with_more_lookups(-0.03)), Tier::counts, "lookups"), GateResult::better);
 }
 
 TEST(PerformanceGate, ViolationsAndUnknownVariancesAreToldButProveNothing) {
   Counts after = example();
   only(after).majorant_violations = 5;
-  EXPECT_EQ(finding(compare_counts(example(), after), Tier::counts, "majorant violations"), Finding::changed);
+  EXPECT_EQ(finding(compare_counts(example(), after), Tier::counts, "majorant violations"), GateResult::changed);
   after = with_more_lookups(0.03);
   only(after).lookups_variance.reset();
   only(after).lookups_theory.reset();
   const PerformanceReport report = compare_counts(example(), after);
-  EXPECT_EQ(finding(report, Tier::counts, "lookups"), Finding::changed);
-  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), Finding::not_compared);
+  EXPECT_EQ(finding(report, Tier::counts, "lookups"), GateResult::changed);
+  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), GateResult::not_compared);
   EXPECT_EQ(report.exit(), ExitCode::ok);
 }
 
@@ -117,24 +117,24 @@ TEST(PerformanceGate, ALooserMajorantIsFoundWhereExactCountsCannotBeCompared) {
   Counts after = with_more_lookups(0.03);
   only(after).id = "another seed";
   const PerformanceReport report = compare_counts(example(), after);
-  EXPECT_EQ(finding(report, Tier::counts, "counts"), Finding::not_compared);
-  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), Finding::regression);
-  EXPECT_EQ(finding(report, Tier::expected, "expected lookups"), Finding::same);
+  EXPECT_EQ(finding(report, Tier::counts, "counts"), GateResult::not_compared);
+  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), GateResult::regression);
+  EXPECT_EQ(finding(report, Tier::expected, "expected lookups"), GateResult::same);
   // Without samples enough for an interval, theory alone still tells.
   after = example();
   only(after).id = "another seed";
   only(after).samples = 100, only(after).lookups = 1030;
   only(after).lookups_theory = 10.3;
   const PerformanceReport few = compare_counts(example(), after);
-  EXPECT_EQ(finding(few, Tier::expected, "mean lookups"), Finding::not_compared);
-  EXPECT_EQ(finding(few, Tier::expected, "expected lookups"), Finding::regression);
+  EXPECT_EQ(finding(few, Tier::expected, "mean lookups"), GateResult::not_compared);
+  EXPECT_EQ(finding(few, Tier::expected, "expected lookups"), GateResult::regression);
 }
 
 TEST(PerformanceGate, AnotherSeedOfTheSameExpectationIsNoRegression) {
   Counts after = with_more_lookups(0.002);
   only(after).id = "another seed";
   const PerformanceReport report = compare_counts(example(), after);
-  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), Finding::same);
+  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), GateResult::same);
   EXPECT_EQ(report.exit(), ExitCode::ok);
   only(after).setting = "another medium";
   EXPECT_EQ(compare_counts(example(), after).exit(), ExitCode::nothing_ran);
@@ -145,7 +145,7 @@ TEST(PerformanceGate, TheMeanIsHeldAgainstItselfWhereTheoryDidNotHold) {
   only(before).lookups_theory = only(after).lookups_theory = 9;
   only(after).id = "another seed";
   const PerformanceReport report = compare_counts(before, after);
-  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), Finding::same);
+  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), GateResult::same);
 }
 
 TEST(PerformanceGate, InstructionsBeyondTheirThresholdAreARegression) {
@@ -155,13 +155,13 @@ TEST(PerformanceGate, InstructionsBeyondTheirThresholdAreARegression) {
     only(after).instructions = static_cast<std::uint64_t>(std::llround(4e8 * (1 + share)));
     return finding(compare_counts(before, after), Tier::instructions, "instructions");
   };
-  EXPECT_EQ(compared(0.03), Finding::regression);
-  EXPECT_EQ(compared(0.0021), Finding::regression);
-  EXPECT_EQ(compared(0.0019), Finding::same);
-  EXPECT_EQ(compared(-0.0019), Finding::same);
-  EXPECT_EQ(compared(-0.03), Finding::better);
-  EXPECT_EQ(compared(0.003, {0.0005, 0.001, 0.0015, 0.002}), Finding::same);
-  EXPECT_EQ(compared(0.03, {0, 0.1, 0.2, 0.3}), Finding::regression) << "no history hides 3 %";
+  EXPECT_EQ(compared(0.03), GateResult::regression);
+  EXPECT_EQ(compared(0.0021), GateResult::regression);
+  EXPECT_EQ(compared(0.0019), GateResult::same);
+  EXPECT_EQ(compared(-0.0019), GateResult::same);
+  EXPECT_EQ(compared(-0.03), GateResult::better);
+  EXPECT_EQ(compared(0.003, {0.0005, 0.001, 0.0015, 0.002}), GateResult::same);
+  EXPECT_EQ(compared(0.03, {0, 0.1, 0.2, 0.3}), GateResult::regression) << "no history hides 3 %";
 }
 
 TEST(PerformanceGate, ThresholdIsTheUpperFenceOfTheHistory) {
@@ -178,22 +178,22 @@ TEST(PerformanceGate, ExactCountsOfAnotherBuildAreNotCompared) {
   ++only(after).draws;
   only(after).instructions = 500'000'000;
   PerformanceReport report = compare_counts(example(), after);
-  EXPECT_EQ(report.count(Finding::regression), 0u);
+  EXPECT_EQ(report.count(GateResult::regression), 0u);
   ASSERT_EQ(report.notes.size(), 1u);
   EXPECT_NE(report.notes[0].find("gcc 13"), std::string::npos);
   EXPECT_NE(performance_text(report).find("not compared (tier 1"), std::string::npos);
-  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), Finding::same);
+  EXPECT_EQ(finding(report, Tier::expected, "mean lookups"), GateResult::same);
   // Old results do not say what they were built for; two such are not equal builds.
   Counts before = example();
   before.build = after.build = {};
-  EXPECT_EQ(compare_counts(before, after).count(Finding::regression), 0u);
+  EXPECT_EQ(compare_counts(before, after).count(GateResult::regression), 0u);
 }
 
 TEST(PerformanceGate, CellsOfOneSideAloneAreNotCompared) {
   Counts after = example();
   only(after).name = "renamed";
   const PerformanceReport report = compare_counts(example(), after);
-  EXPECT_EQ(report.count(Finding::not_compared), 2u);
+  EXPECT_EQ(report.count(GateResult::not_compared), 2u);
   EXPECT_EQ(report.exit(), ExitCode::nothing_ran);
   for (const std::string& text : {performance_text(report), performance_markdown(report)}) {
     EXPECT_NE(text.find("only on the new side; cells are matched by name): 1 cell, for example renamed"), std::string::npos);
@@ -282,7 +282,7 @@ struct Noise {
   Real operator()() { return std::exp(std::normal_distribution<Real>(0, 0.03)(engine)); }
 };
 
-std::size_t count(const std::vector<GateRow>& rows, Finding finding) {
+std::size_t count(const std::vector<GateRow>& rows, GateResult finding) {
   return static_cast<std::size_t>(
       std::count_if(rows.begin(), rows.end(), [&](const GateRow& row) { return row.finding == finding; }));
 }
@@ -294,18 +294,18 @@ TEST(PerformanceGateWallTime, OnlyWhatIsSurelyBeyondTheThresholdIsSlower) {
   });
   const std::vector<GateRow> rows = compare_wall_time(timed, {}, false);
   ASSERT_EQ(rows.size(), 3u);
-  EXPECT_EQ(rows[0].finding, Finding::same);
-  EXPECT_EQ(rows[1].finding, Finding::slower);
+  EXPECT_EQ(rows[0].finding, GateResult::same);
+  EXPECT_EQ(rows[1].finding, GateResult::slower);
   EXPECT_NEAR(*rows[1].change, 0.15, 0.05);
-  EXPECT_NE(rows[2].finding, Finding::slower);
-  EXPECT_EQ(compare_wall_time(timed, {}, true)[1].finding, Finding::regression);
-  EXPECT_EQ(count(compare_wall_time(timed, 0.3, true), Finding::regression), 0u);
+  EXPECT_NE(rows[2].finding, GateResult::slower);
+  EXPECT_EQ(compare_wall_time(timed, {}, true)[1].finding, GateResult::regression);
+  EXPECT_EQ(count(compare_wall_time(timed, 0.3, true), GateResult::regression), 0u);
 }
 
 TEST(PerformanceGateWallTime, DriftWithinABlockCancels) {
   const auto timed = blocks(10, 1, [](int, int, int at) { return 100 * std::exp(0.05 * at); });
   const GateRow row = compare_wall_time(timed, {}, false).at(0);
-  EXPECT_EQ(row.finding, Finding::same);
+  EXPECT_EQ(row.finding, GateResult::same);
   EXPECT_NEAR(*row.change, 0, 1e-12);
 }
 
@@ -315,7 +315,7 @@ TEST(PerformanceGateWallTime, AMachineThatTellsAProgramFromItselfIsNoisy) {
     return 100 * noise() * (side == 2 && cell == 0 ? 1.2 : 1.0) * (side == 1 && cell == 1 ? 1.3 : 1.0);
   });
   const std::vector<GateRow> rows = compare_wall_time(timed, {}, true);
-  EXPECT_EQ(count(rows, Finding::noisy), 2u);
+  EXPECT_EQ(count(rows, GateResult::noisy), 2u);
   EXPECT_NE(rows[0].note.find("in cell 0"), std::string::npos) << rows[0].note;
 }
 
@@ -324,7 +324,7 @@ TEST(PerformanceGateWallTime, EqualProgramsAreNotTold) {
   std::size_t told = 0;
   for (int run = 0; run < 50; ++run) {
     const auto rows = compare_wall_time(blocks(10, 16, [&](int, int, int) { return 100 * noise(); }), {}, true);
-    told += count(rows, Finding::regression) + count(rows, Finding::better) + count(rows, Finding::noisy);
+    told += count(rows, GateResult::regression) + count(rows, GateResult::better) + count(rows, GateResult::noisy);
   }
   EXPECT_EQ(told, 0u);
 }
@@ -345,8 +345,8 @@ class GateCli : public ProgramTest {
   }
 
   static std::string config(int samples) {
-    return fmt::format(R"({{"$schema":"nullmark/config/1","name":"c","timing":{{"enabled":false}},"experiments":[
-      {{"name":"e","rays":{{"type":"orthographic","width":16,"height":16}},"samples_per_ray":{},"gate":{{"enabled":false}},
+    return fmt::format(R"({{"nullmark":"config/2","name":"c","timing":{{"enabled":false}},"experiments":[
+      {{"name":"e","rays":{{"type":"orthographic","width":16,"height":16}},"samples_per_ray":{},"verdict":{{"enabled":false}},
        "matrix":{{"estimator":["ratio","delta"],"medium":[{{"type":"gaussian_bump","optical_depth":2}}]}}}}]}})",
                        samples);
   }
@@ -447,7 +447,7 @@ TEST_F(GateCli, BadInputIsOneLineAndCodeTwo) {
 
 TEST_F(GateCli, BlocksThatAreIncompleteAreRefusedAndWallTimeIsAdvisory) {
   std::filesystem::create_directory(folder_ / "blocks");
-  write("timed.json", R"({"$schema":"nullmark/config/1","timing":{"repetitions":1,"seconds":1e-6},"experiments":[
+  write("timed.json", R"({"nullmark":"config/2","timing":{"repetitions":1,"seconds":1e-6},"experiments":[
       {"name":"e","rays":"single","samples_per_ray":1000,"matrix":{"estimator":["ratio"],"medium":["linear"]}}]})");
   ASSERT_EQ(run("run timed.json -o timed.results.json"), 0);
   RunRecord timed = read_results(read("timed.results.json"), "timed");

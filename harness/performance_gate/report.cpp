@@ -12,8 +12,8 @@ namespace nullmark {
 namespace {
 
 constexpr Tier kTiers[] = {Tier::counts, Tier::expected, Tier::instructions, Tier::wall_time};
-constexpr Finding kGravest[] = {Finding::regression, Finding::slower, Finding::noisy,        Finding::undecided,
-                                Finding::changed,    Finding::better, Finding::not_compared, Finding::same};
+constexpr GateResult kGravest[] = {GateResult::regression, GateResult::slower, GateResult::noisy,        GateResult::undecided,
+                                   GateResult::changed,    GateResult::better, GateResult::not_compared, GateResult::same};
 
 std::string percent(const std::optional<Real>& change) {
   if (!change) return "-";
@@ -41,9 +41,10 @@ std::string sentence(const GateRow& row) {
 
 std::vector<const GateRow*> by_gravity(const PerformanceReport& report, bool all) {
   std::vector<const GateRow*> rows;
-  for (const Finding finding : kGravest)
+  for (const GateResult finding : kGravest)
     for (const GateRow& row : report.rows)
-      if (row.finding == finding && (all || (finding != Finding::same && finding != Finding::not_compared))) rows.push_back(&row);
+      if (row.finding == finding && (all || (finding != GateResult::same && finding != GateResult::not_compared)))
+        rows.push_back(&row);
   return rows;
 }
 
@@ -67,7 +68,7 @@ std::vector<std::string> totals(const PerformanceReport& report) {
   std::vector<std::string> lines;
   for (const Tier tier : kTiers) {
     std::string line;
-    for (const Finding finding : kGravest)
+    for (const GateResult finding : kGravest)
       if (const std::size_t count = report.count(tier, finding); count > 0)
         line += fmt::format("{}{} {}", line.empty() ? "" : ", ", count, to_string(finding));
     lines.push_back(
@@ -81,7 +82,7 @@ std::vector<std::string> totals(const PerformanceReport& report) {
 std::vector<std::string> left_out(const PerformanceReport& report) {
   std::map<std::string, std::pair<std::size_t, std::string>> reasons;
   for (const GateRow& row : report.rows) {
-    if (row.finding != Finding::not_compared) continue;
+    if (row.finding != GateResult::not_compared) continue;
     auto& [count, example] = reasons[fmt::format("tier {}, {}", static_cast<int>(row.tier), row.note)];
     if (++count == 1) example = row.cell;
   }
@@ -94,7 +95,7 @@ std::vector<std::string> left_out(const PerformanceReport& report) {
 }
 
 std::string conclusion(const PerformanceReport& report) {
-  if (const std::size_t regressions = report.count(Finding::regression); regressions > 0)
+  if (const std::size_t regressions = report.count(GateResult::regression); regressions > 0)
     return fmt::format("{} performance regressions proven", regressions);
   if (report.exit() == ExitCode::nothing_ran) return "nothing could be compared";
   return "no performance regression proven";
@@ -105,7 +106,7 @@ std::string remedy(const PerformanceReport& report) {
   std::size_t differ = 0;
   for (const GateRow& row : report.rows)
     differ += row.tier != Tier::wall_time &&
-              (row.finding == Finding::regression || row.finding == Finding::changed || row.finding == Finding::better);
+              (row.finding == GateResult::regression || row.finding == GateResult::changed || row.finding == GateResult::better);
   if (differ == 0) return "";
   return fmt::format("{} counts are not {}'s; if that is meant, make these the baseline with --update and review the difference",
                      differ, report.before);
@@ -154,11 +155,11 @@ std::string performance_junit(const PerformanceReport& report) {
   for (const GateRow& row : report.rows) {
     cases += fmt::format("    <testcase classname=\"tier {}, {}\" name=\"{}: {}\"", static_cast<int>(row.tier),
                          to_string(row.tier), xml(row.cell), xml(row.metric));
-    if (row.finding == Finding::same || row.finding == Finding::better) {
+    if (row.finding == GateResult::same || row.finding == GateResult::better) {
       cases += "/>\n";
       continue;
     }
-    const bool failed = row.finding == Finding::regression;
+    const bool failed = row.finding == GateResult::regression;
     ++(failed ? failures : skipped);
     cases +=
         fmt::format(">\n      <{0} message=\"{1}\"/>\n    </testcase>\n", failed ? "failure" : "skipped", xml(sentence(row)));

@@ -90,7 +90,7 @@ std::vector<GateRow> judge(const std::map<std::string, std::vector<Real>>& cells
     rows.push_back({cell,
                     Tier::wall_time,
                     "time over the floor loop's",
-                    Finding::same,
+                    GateResult::same,
                     {},
                     {},
                     std::expm1(mean),
@@ -109,9 +109,9 @@ std::vector<GateRow> judge(const std::map<std::string, std::vector<Real>>& cells
   const std::vector<bool> found = discoveries(p);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Real low = std::log1p(*rows[i].low), high = std::log1p(*rows[i].high);
-    if (low < -margin || high > margin) rows[i].finding = Finding::undecided;
-    if (found[2 * i] && low > margin) rows[i].finding = Finding::slower;
-    if (found[2 * i + 1] && high < -margin) rows[i].finding = Finding::better;
+    if (low < -margin || high > margin) rows[i].finding = GateResult::undecided;
+    if (found[2 * i] && low > margin) rows[i].finding = GateResult::slower;
+    if (found[2 * i + 1] && high < -margin) rows[i].finding = GateResult::better;
   }
   return rows;
 }
@@ -155,14 +155,14 @@ std::vector<GateRow> compare_wall_time(const std::vector<TimedBlock>& blocks, st
   std::vector<GateRow> rows = judge(log_ratios(blocks, &TimedBlock::after), margin);
   std::string told;
   for (const GateRow& control : judge(log_ratios(blocks, &TimedBlock::control), margin))
-    if ((control.finding == Finding::slower || control.finding == Finding::better) && told.empty())
+    if ((control.finding == GateResult::slower || control.finding == GateResult::better) && told.empty())
       told = fmt::format("the control, a program against itself, shows {:+.1f} % in {}", 100 * *control.change, control.cell);
   for (GateRow& row : rows) {
     if (!told.empty()) {
-      row.finding = Finding::noisy;
+      row.finding = GateResult::noisy;
       row.note = told;
-    } else if (row.finding == Finding::slower && quiet) {
-      row.finding = Finding::regression;
+    } else if (row.finding == GateResult::slower && quiet) {
+      row.finding = GateResult::regression;
     }
   }
   return rows;

@@ -9,6 +9,7 @@
 #include "harness/registry/estimator_entry.h"
 #include "harness/registry/ray_sets.h"
 #include "media/base/registry.h"
+#include "media/majorants/register_majorant.h"
 
 namespace nullmark {
 

@@ -41,9 +41,9 @@ std::string order_line(const OrderFit& fit) {
 }
 
 bool disables_verdict(const Json& cell) {
-  if (!cell.is_object() || !cell.contains("gate")) return false;
-  const Json& gate = cell["gate"];
-  return gate.is_object() && gate.contains("enabled") && gate["enabled"] == false;
+  if (!cell.is_object() || !cell.contains("verdict")) return false;
+  const Json& spec = cell["verdict"];
+  return spec.is_object() && spec.contains("enabled") && spec["enabled"] == false;
 }
 
 std::size_t met(const std::vector<Expectation>& all) {

@@ -63,16 +63,15 @@ Json verdict_json_of(const CellRecord& record) {
           {"samples_per_ray", verdict.samples_per_ray}};
 }
 
-Json cost_json(const Contender& contender) {
-  if (!contender.cost) return nullptr;
-  const Cost& cost = *contender.cost;
+Json cost_json(const RankedCell& ranked) {
+  if (!ranked.cost) return nullptr;
+  const Cost& cost = *ranked.cost;
   Json seconds = Json::array();
   for (std::size_t i = 0; i < std::size(kTargets); ++i) {
-    Json entry =
-        contender.seconds[i] ? interval(*contender.seconds[i]) : Json{{"value", nullptr}, {"low", nullptr}, {"high", nullptr}};
+    Json entry = ranked.seconds[i] ? interval(*ranked.seconds[i]) : Json{{"value", nullptr}, {"low", nullptr}, {"high", nullptr}};
     entry["error"] = kTargets[i];
-    entry["amortised"] = contender.amortised[i];
-    entry["reached"] = contender.seconds[i] && std::isfinite(contender.seconds[i]->value);
+    entry["amortised"] = ranked.amortised[i];
+    entry["reached"] = ranked.seconds[i] && std::isfinite(ranked.seconds[i]->value);
     seconds.push_back(std::move(entry));
   }
   return {{"basis", cost.analytic ? "analytic" : "sample"},
@@ -82,7 +81,7 @@ Json cost_json(const Contender& contender) {
           {"variance_x_ns", interval(cost.variance_x_ns)},
           {"floor", interval(cost.floor)},
           {"seconds", std::move(seconds)},
-          {"pareto", contender.pareto}};
+          {"pareto", ranked.pareto}};
 }
 
 /// Nanoseconds of one of `samples` samples that share a traversal; nothing where fewer were timed together than that, or others.
@@ -204,36 +203,36 @@ const char* word(BreakEven::Kind kind) {
   return "at";
 }
 
-Json scene_json(const Contest& contest, const Places& places) {
-  const auto cell = [&](std::size_t contender) { return places.at(contest.contenders[contender].record); };
-  const auto cell_or_null = [&](const std::optional<std::size_t>& contender) {
-    return contender ? Json(cell(*contender)) : Json(nullptr);
+Json scene_json(const Comparison& comparison, const Places& places) {
+  const auto cell = [&](std::size_t ranked) { return places.at(comparison.cells[ranked].record); };
+  const auto cell_or_null = [&](const std::optional<std::size_t>& ranked) {
+    return ranked ? Json(cell(*ranked)) : Json(nullptr);
   };
   Json ranking = Json::array(), break_even = Json::array();
-  for (std::size_t i = 0; i < contest.contenders.size(); ++i) {
-    const Contender& contender = contest.contenders[i];
+  for (std::size_t i = 0; i < comparison.cells.size(); ++i) {
+    const RankedCell& ranked = comparison.cells[i];
     ranking.push_back({{"cell", cell(i)},
-                       {"label", contender.label},
-                       {"rank", place(contender.rank)},
-                       {"tied", contender.tied},
-                       {"relative", interval(contender.relative)}});
-    if (!contender.break_even) continue;
-    const bool at = contender.break_even->kind == BreakEven::Kind::at;
+                       {"label", ranked.label},
+                       {"rank", place(ranked.rank)},
+                       {"tied", ranked.tied},
+                       {"relative", interval(ranked.relative)}});
+    if (!ranked.break_even) continue;
+    const bool at = ranked.break_even->kind == BreakEven::Kind::at;
     break_even.push_back({{"cell", cell(i)},
-                          {"against", cell(*contest.best_unbiased)},
-                          {"kind", word(contender.break_even->kind)},
-                          {"seconds", at ? interval(contender.break_even->seconds) : Json(nullptr)},
-                          {"error", at ? interval(contender.break_even->error) : Json(nullptr)}});
+                          {"against", cell(*comparison.best_unbiased)},
+                          {"kind", word(ranked.break_even->kind)},
+                          {"seconds", at ? interval(ranked.break_even->seconds) : Json(nullptr)},
+                          {"error", at ? interval(ranked.break_even->error) : Json(nullptr)}});
   }
-  return {{"name", contest.name},
-          {"quantity", contest.quantity},
-          {"medium", contest.medium},
-          {"majorant", contest.majorant},
-          {"rays", contest.rays},
-          {"light", contest.light},
-          {"measurement", contest.measurement},
-          {"baseline", cell_or_null(contest.baseline)},
-          {"best_unbiased", cell_or_null(contest.best_unbiased)},
+  return {{"name", comparison.name},
+          {"quantity", comparison.quantity},
+          {"medium", comparison.medium},
+          {"majorant", comparison.majorant},
+          {"rays", comparison.rays},
+          {"light", comparison.light},
+          {"measurement", comparison.measurement},
+          {"baseline", cell_or_null(comparison.baseline)},
+          {"best_unbiased", cell_or_null(comparison.best_unbiased)},
           {"ranking", std::move(ranking)},
           {"break_even", std::move(break_even)}};
 }
@@ -297,20 +296,20 @@ Json claim_json(const ClaimFinding& finding, const CellsByName& cells, const Pla
           {"note", finding.claim->note}, {"finding", to_string(finding.outcome)}, {"parts", std::move(parts)}};
 }
 
-Json matrix_json(const std::vector<Contest>& all, const Places& places) {
+Json matrix_json(const std::vector<Comparison>& all, const Places& places) {
   std::vector<std::string> rows;
-  for (const Contest& contest : all)
-    for (const Contender& contender : contest.contenders)
-      if (std::find(rows.begin(), rows.end(), contender.label) == rows.end()) rows.push_back(contender.label);
+  for (const Comparison& comparison : all)
+    for (const RankedCell& ranked : comparison.cells)
+      if (std::find(rows.begin(), rows.end(), ranked.label) == rows.end()) rows.push_back(ranked.label);
   std::sort(rows.begin(), rows.end());
   Json cells = Json::array(), columns = Json::array();
   for (std::size_t scene = 0; scene < all.size(); ++scene) columns.push_back({{"scene", scene}, {"label", all[scene].name}});
   for (const std::string& row : rows) {
     Json line = Json::array();
-    for (const Contest& contest : all) {
-      const auto at = std::find_if(contest.contenders.begin(), contest.contenders.end(),
-                                   [&](const Contender& contender) { return contender.label == row; });
-      line.push_back(at == contest.contenders.end() ? Json(nullptr) : Json(places.at(at->record)));
+    for (const Comparison& comparison : all) {
+      const auto at = std::find_if(comparison.cells.begin(), comparison.cells.end(),
+                                   [&](const RankedCell& ranked) { return ranked.label == row; });
+      line.push_back(at == comparison.cells.end() ? Json(nullptr) : Json(places.at(at->record)));
     }
     cells.push_back(std::move(line));
   }
@@ -424,29 +423,29 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
     for (const Table& table : runs[run].tables) json["tables"].push_back(table_json(table, cells, places));
     for (const ClaimFinding& finding : summary.findings) json["claims"].push_back(claim_json(finding, cells, places));
   }
-  const std::vector<Contest> all = contests(runs, baseline);
+  const std::vector<Comparison> all = comparisons(runs, baseline);
   json["scenes"] = Json::array();
   json["paired"] = Json::array();
   json["unpaired"] = Json::array();
   for (std::size_t scene = 0; scene < all.size(); ++scene) {
     json["scenes"].push_back(scene_json(all[scene], places));
-    for (const Contender& contender : all[scene].contenders) {
-      Json& cell = json["cells"][places.at(contender.record)];
+    for (const RankedCell& ranked : all[scene].cells) {
+      Json& cell = json["cells"][places.at(ranked.record)];
       cell["scene"] = scene;
-      cell["cost"] = cost_json(contender);
-      cell["convergence"] = convergence_row(*contender.record, contender.cost);
+      cell["cost"] = cost_json(ranked);
+      cell["convergence"] = convergence_row(*ranked.record, ranked.cost);
     }
     for (const Pairing& pairing : all[scene].pairings)
       json["paired"].push_back({{"scene", scene},
-                                {"cell", places.at(all[scene].contenders[pairing.contender].record)},
-                                {"against", places.at(all[scene].contenders[pairing.against].record)},
+                                {"cell", places.at(all[scene].cells[pairing.ranked].record)},
+                                {"against", places.at(all[scene].cells[pairing.against].record)},
                                 {"ratio", interval(pairing.ratio)},
                                 {"unpaired", interval(pairing.unpaired)},
                                 {"samples", pairing.samples},
                                 {"of_the_means", interval(pairing.of_the_means)}});
     for (const Unpaired& one : all[scene].unpaired)
       json["unpaired"].push_back(
-          {{"scene", scene}, {"cell", places.at(all[scene].contenders[one.contender].record)}, {"reason", one.reason}});
+          {{"scene", scene}, {"cell", places.at(all[scene].cells[one.ranked].record)}, {"reason", one.reason}});
   }
   json["title"] = title;
   json["version"] = this_version();

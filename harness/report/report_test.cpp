@@ -166,7 +166,7 @@ TEST_F(ReportImage, LargePicturesAreAveragedDown) {
 class ReportCli : public ProgramTest {};
 
 TEST_F(ReportCli, WritesThePageAndASummary) {
-  write("c.json", R"({"$schema":"nullmark/config/1","timing":{"repetitions":2,"seconds":0.001},"experiments":[
+  write("c.json", R"({"nullmark":"config/2","timing":{"repetitions":2,"seconds":0.001},"experiments":[
       {"name":"e","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":64,"images":true,
        "matrix":{"estimator":["ratio","delta"],"medium":["linear"]}}]})");
   ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");

@@ -33,15 +33,15 @@ TEST(Remarks, TimesOfABusyMachineSaySo) {
 }
 
 TEST(Summary, SaysThatTheConfigurationDisabledTheVerdict) {
-  const Plan plan = read_config(R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
-      "gate":{"enabled":false},"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}]})",
+  const Plan plan = read_config(R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
+      "verdict":{"enabled":false},"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}]})",
                                 "c.json");
   RunRecord run = example_results(plan);
   const Summary summary = summarise(run);
   EXPECT_NE(summary_text(run, summary).find("no cell was judged: the configuration disables the verdict in all 2 cells"),
             std::string::npos)
       << summary_text(run, summary);
-  for (const char* hostile : {"[]", R"({"experiments":3})", R"({"experiments":[{"include":[{"gate":{"enabled":7}}, 1]}]})"}) {
+  for (const char* hostile : {"[]", R"({"experiments":3})", R"({"experiments":[{"include":[{"verdict":{"enabled":7}}, 1]}]})"}) {
     run.config_text = hostile;
     EXPECT_NE(summary_text(run, summarise(run)).find("no cell was judged\n"), std::string::npos) << hostile;
   }

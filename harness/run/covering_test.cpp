@@ -13,8 +13,7 @@ namespace {
 
 Plan plan_of(const std::string& matrix) {
   return read_config(
-      R"({"$schema":"nullmark/config/1","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":)" + matrix +
-          "}]}",
+      R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":)" + matrix + "}]}",
       "test.json");
 }
 

@@ -12,6 +12,7 @@
 
 #include "harness/io/file_io.h"
 #include "harness/io/results_json.h"
+#include "harness/io/spec_json.h"
 
 namespace nullmark {
 namespace {
@@ -77,9 +78,9 @@ void Journal::read(const std::string& config_hash, Mode mode) {
     const std::string where = fmt::format("{}:{}", path_, ++number);
     begin = end + 1;
     const Json json = parse_json(line, where);
-    const Place place(json, where);
+    const JsonNode node(json, where);
     if (number > 1) {
-      CellRecord record = read_cell(place);
+      CellRecord record = read_cell(node);
       const auto same = [&](const CellRecord& other) {
         return other.cell.id == record.cell.id && other.cell.name == record.cell.name;
       };
@@ -87,13 +88,13 @@ void Journal::read(const std::string& config_hash, Mode mode) {
       cells_.push_back(std::move(record));
       continue;
     }
-    place.expect_object();
-    if (place["nullmark_journal"].integer(0, 1'000'000) != kJournalSchema)
-      place["nullmark_journal"].expected(fmt::format("{}, the journal this program writes", kJournalSchema));
-    if (const Place schema = place["nullmark_schema"]; schema.integer(0, 1'000'000) != RunRecord::kSchema)
-      schema.expected(fmt::format("{}, the schema this program writes", RunRecord::kSchema));
-    if (place["config_hash"].string() != config_hash)
-      place["config_hash"].expected(
+    node.expect_object();
+    if (node["nullmark_journal"].integer(0, 1'000'000) != kJournalSchema)
+      node["nullmark_journal"].expected(fmt::format("{}, the journal this program writes", kJournalSchema));
+    if (const JsonNode version = node[kVersionKey]; version.string() != RunRecord::kVersion)
+      version.expected(fmt::format("\"{}\", which this program writes", RunRecord::kVersion));
+    if (node["config_hash"].string() != config_hash)
+      node["config_hash"].expected(
           fmt::format("\"{}\": the journal is of another configuration or seed; --force starts again", config_hash));
   }
   holds_cells_ = !cells_.empty();
@@ -103,8 +104,7 @@ void Journal::read(const std::string& config_hash, Mode mode) {
 
 void Journal::write_header(const std::string& config_hash) {
   if (::ftruncate(file_, 0) != 0) throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
-  const Json header = {
-      {"nullmark_journal", kJournalSchema}, {"nullmark_schema", RunRecord::kSchema}, {"config_hash", config_hash}};
+  const Json header = {{"nullmark_journal", kJournalSchema}, {kVersionKey, RunRecord::kVersion}, {"config_hash", config_hash}};
   write_durably(file_, header.dump() + "\n", path_);
 }
 

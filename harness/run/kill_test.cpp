@@ -71,8 +71,8 @@ class Process {
 class Kill : public ProgramTest {
  protected:
   // Tests of laws would take most of the time, and write nothing.
-  static constexpr const char* kConfig = R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
-      {"name":"e","rays":{"type":"orthographic","width":8,"height":8},"gate":{"laws":"never"},"samples_per_ray":@,
+  static constexpr const char* kConfig = R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
+      {"name":"e","rays":{"type":"orthographic","width":8,"height":8},"verdict":{"laws":"never"},"samples_per_ray":@,
        "matrix":{"estimator":["ratio","delta","residual_ratio"],"medium":{"type":"linear","end":#}}}]})";
 
   void SetUp() override {

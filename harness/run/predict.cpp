@@ -20,24 +20,24 @@ void foresee(const PreparedCell& prepared, const TestLevels& levels, Prediction&
     prediction.verdict = "by a pilot";
     return;
   }
-  const CellGate gate = plan_gate(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim,
-                                  prepared.theory, std::nullopt, levels);
-  prediction.planned = gate.planned;
-  if (gate.planned <= gate.affordable)
-    prediction.most = std::max(prediction.most, std::min(gate.allowance, kPatience * gate.planned));
+  const TestPlan test_plan = plan_tests(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim,
+                                        prepared.theory, std::nullopt, levels);
+  prediction.planned = test_plan.planned;
+  if (test_plan.planned <= test_plan.affordable)
+    prediction.most = std::max(prediction.most, std::min(test_plan.allowance, kMostSampleFactor * test_plan.planned));
   prediction.verdict = prepared.needs_bound && !prepared.scene->bounding ? "VIOLATED"
-                       : gate.undecidable.empty()                        ? "PASS"
+                       : test_plan.undecidable.empty()                   ? "PASS"
                                                                          : "INCONCLUSIVE";
 }
 
 }  // namespace
 
 std::vector<Prediction> predict(const Plan& plan, const std::vector<bool>& selected) {
-  Workshop workshop(plan);
-  std::vector<PreparedCell> cells = prepare_all(workshop, plan, [&](std::size_t i) { return selected[i]; });
+  CellPreparer preparer(plan);
+  std::vector<PreparedCell> cells = prepare_all(preparer, plan, [&](std::size_t i) { return selected[i]; });
   add_theory(cells);
   std::vector<Prediction> result;
-  const TestLevels levels{plan.levels.alpha_pass, mean_family(plan)};
+  const TestLevels levels{plan.error_rates.alpha_pass, mean_family(plan)};
   for (const PreparedCell& prepared : cells) {
     Prediction prediction;
     prediction.status = prepared.reason.empty() ? "ok" : prepared.reason;

@@ -55,7 +55,7 @@ class Sampler {
   const Kernel& kernel_;
   std::unique_ptr<Workspace> workspace_;
   std::uint64_t key_;
-  RayContext context_;
+  PreparedRay context_;
   SampleBlock block_;
   Counters counters_;
 };
@@ -175,8 +175,8 @@ Replay replay_sample(const RunRecord& run, const std::string& file, const std::s
   if (run.config_text.empty()) throw InputError(file + ": holds no configuration; expected the output of `nullmark run`");
   const Plan plan = read_config(run.config_text, file + "#config");
   const std::size_t place = place_of(plan, file, record.cell);
-  Workshop workshop(plan);
-  const PreparedCell cell = workshop.prepare(place);
+  CellPreparer preparer(plan);
+  const PreparedCell cell = preparer.prepare(place);
   if (!cell.reason.empty()) throw InputError(fmt::format("{}: \"{}\" cannot be sampled: {}", file, name, cell.reason));
   if (const std::string hash = fmt::format("{:016x}", cell.scene->medium->hash); hash != record.medium_hash)
     throw InputError(fmt::format("{}: \"{}\": the medium's data have changed since (hash {}, now {}); run it again", file, name,

@@ -16,8 +16,7 @@ namespace {
 
 RunRecord run(const std::string& experiment) {
   const Plan plan = read_config(
-      fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e",{}}}]}})",
-                  experiment),
+      fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e",{}}}]}})", experiment),
       "c.json");
   RunRecord run;
   run.config_text = plan.config_text;
@@ -34,7 +33,7 @@ constexpr std::uint64_t kSamples = 5;
 /// Means, lookups and draws of a run are those of its samples, one by one.
 void expect_sums(const std::string& matrix) {
   const RunRecord results =
-      run(fmt::format(R"("samples_per_ray":{},"gate":{{"enabled":false}},"matrix":{{{}}})", kSamples, matrix));
+      run(fmt::format(R"("samples_per_ray":{},"verdict":{{"enabled":false}},"matrix":{{{}}})", kSamples, matrix));
   for (const CellRecord& record : results.cells) {
     SCOPED_TRACE(record.cell.name);
     ASSERT_EQ(record.status, Status::ok) << record.reason;
@@ -123,7 +122,7 @@ TEST(ReplaySample, NumbersInFloatDecideTheWalk) {
 
 TEST(ReplaySample, LeftOutItIsTheFarthestFromItsTarget) {
   const RunRecord results =
-      run(R"("samples_per_ray":10,"gate":{"epsilon":0.5,"max_samples_per_ray":1000},"matrix":{"estimator":"residual_ratio",
+      run(R"("samples_per_ray":10,"verdict":{"epsilon":0.5,"max_samples_per_ray":1000},"matrix":{"estimator":"residual_ratio",
       "medium":{"type":"fractal_noise","spectrum":[0.5,1]},"rays":{"type":"orthographic","width":3,"height":3}})");
   const CellRecord& record = results.cells[0];
   const auto distance = [](const Replay& sample) {
@@ -144,7 +143,7 @@ TEST(ReplaySample, LeftOutItIsTheFarthestFromItsTarget) {
 }
 
 TEST(ReplaySample, WhatIsNotFiniteIsFarthest) {
-  const RunRecord results = run(R"("samples_per_ray":20000,"gate":{"enabled":false},"matrix":{
+  const RunRecord results = run(R"("samples_per_ray":20000,"verdict":{"enabled":false},"matrix":{
       "estimator":{"type":"planted_nan","chance":1e-3},"medium":"homogeneous","rays":"single"})");
   EXPECT_GT(results.cells[0].nonfinite, 1u);
   const Replay found = replay(results, results.cells[0], {});
@@ -185,7 +184,7 @@ TEST(ReplaySample, RefusesWhatIsNotThere) {
 class ReplayCli : public ProgramTest {};
 
 TEST_F(ReplayCli, ShowsASampleOfAFile) {
-  write("c.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e","samples_per_ray":50,
+  write("c.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e","samples_per_ray":50,
       "matrix":{"estimator":"ratio","medium":"cosine","rays":"single"}}]})");
   ASSERT_EQ(ProgramTest::run("run c.json"), 0) << read("err");
   const std::string cell = ProgramTest::results("c.results.json").cells[0].cell.name;

@@ -31,7 +31,7 @@ struct Replay {
     Component tracker;
     tracker.type = estimator;
     const auto kernel = make_estimator(tracker)->kernel(1);
-    RayContext context;
+    PreparedRay context;
     context.world = built.world.at(0);
     context.local = built.local.at(0);
     const auto bounds = make_majorant(structure)->build(medium.medium);
@@ -146,7 +146,7 @@ TEST(Replay, TransmittanceMultiplies) {
     constexpr std::size_t kCount = 200000;
     std::vector<Real> product(kCount, 1);
     for (std::uint32_t part = 0; part < 2; ++part) {
-      RayContext context;
+      PreparedRay context;
       context.index = part;
       context.world = rays.world[0];
       context.local = rays.local[0];

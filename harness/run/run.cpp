@@ -48,15 +48,17 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
   }
   const auto progress = [&](double fraction) { observer.progress(record, fraction); };
   std::vector<KeptSamples> kept;
-  const std::optional<CellGate> gate = tests_of(prepared, TestLevels{plan.levels.alpha_pass, families.means}, kept, stop);
-  const auto sampled =
-      sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                  {.per_ray = prepared.samples_per_ray, .keep = gate.has_value()}, gate ? &*gate : nullptr, stop, progress);
+  const std::optional<TestPlan> test_plan =
+      tests_of(prepared, TestLevels{plan.error_rates.alpha_pass, families.means}, kept, stop);
+  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
+                                   {.per_ray = prepared.samples_per_ray, .keep = test_plan.has_value()},
+                                   test_plan ? &*test_plan : nullptr, stop, progress);
   if (sampled) outcome.effort += *sampled;
   if (sampled && sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   std::optional<VerdictRecord> verdict;
-  if (sampled && gate) verdict = judge(prepared, *gate, *sampled, kept, plan.levels, families, outcome.effort, stop, progress);
-  if (!sampled || (gate && !verdict)) {
+  if (sampled && test_plan)
+    verdict = judge(prepared, *test_plan, *sampled, kept, plan.error_rates, families, outcome.effort, stop, progress);
+  if (!sampled || (test_plan && !verdict)) {
     record.reason = "interrupted";
     return outcome;
   }
@@ -118,11 +120,11 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
 
   const bool timing = options.timing && plan.timing.enabled;
   const Families families{mean_family(plan), lookups_family(plan), laws_family(plan)};
-  Workshop workshop(plan);
+  CellPreparer preparer(plan);
   std::vector<PreparedCell> cells =
-      prepare_all(workshop, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
+      prepare_all(preparer, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
   // Statistics of a resumed run stand; a run that was stopped before or while timing still owes the times.
-  const std::vector<PreparedCell> untimed = prepare_all(workshop, plan, [&](std::size_t i) {
+  const std::vector<PreparedCell> untimed = prepare_all(preparer, plan, [&](std::size_t i) {
     const auto record = records.find(i);
     return timing && record != records.end() && record->second.status == Status::ok && !record->second.time;
   });

@@ -23,7 +23,7 @@ namespace nullmark {
 namespace {
 
 Plan plan() {
-  return read_config(R"({"$schema":"nullmark/config/1","name":"test","timing":{"enabled":false},
+  return read_config(R"({"nullmark":"config/2","name":"test","timing":{"enabled":false},
       "experiments":[{"name":"cells","rays":{"type":"orthographic","width":5,"height":4},
         "matrix":{"samples_per_ray":[2,64,1000],"estimator":["ratio","delta","next_flight_ratio"],
                   "medium":[{"type":"cosine","optical_depth":[0.5,2]},{"type":"linear","optical_depth":[0.5,1]}]}}]})",
@@ -40,7 +40,7 @@ std::vector<CellRecord> run(const Plan& plan, int threads, const RunObserver& ob
 /// Single precision is skipped where it has no digits for a position or a flight, and what it adds to a mean is no bias.
 TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
   const auto only_record = [](const std::string& matrix) {
-    const Plan cells = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e",
+    const Plan cells = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e",
         "rays":{"type":"single"},"samples_per_ray":20000,"matrix":{"estimator":"ratio","precision":"float",)" +
                                        matrix + "}}]}",
                                    "test.json");
@@ -65,11 +65,10 @@ TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
 
 /// What is left of samples that are not all finite has no say.
 TEST(Run, ACellThatIsNotFiniteKeepsReferencesAndTheoryAlone) {
-  const Plan cells =
-      read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
+  const Plan cells = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
       "samples_per_ray":64,"matrix":{"estimator":{"type":"planted_nan","chance":0.5},
       "medium":["linear",{"type":"linear","spectrum":[1,2]}]}}]})",
-                  "test.json");
+                                 "test.json");
   RunRecord results;
   results.cells = run(cells, 1, {});
   RunRecord again = read_results(results_text(results), "r.json");
@@ -101,7 +100,7 @@ TEST(Run, ACellThatIsNotFiniteKeepsReferencesAndTheoryAlone) {
 
 /// A tracker that is wrong where there is nothing to meet is wrong.
 TEST(Run, ABiasIsProvenEvenInVacuum) {
-  const Plan cells = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"e",
+  const Plan cells = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e",
       "rays":{"type":"single","from":[0,0.5,0.5],"to":[1,0.5,0.5]},"samples_per_ray":20000,
       "matrix":{"estimator":["ratio","planted_zero"],"medium":{"type":"homogeneous","extinction":0}}}]})",
                                  "test.json");
@@ -122,8 +121,8 @@ TEST(Run, TheShareOfWaitingIsWhatTheThreadsClockLacks) {
 
 TEST(Run, TimesEveryNumberOfSamplesPerTraversal) {
   const Plan cells =
-      read_config(R"({"$schema":"nullmark/config/1","timing":{"repetitions":3,"seconds":0.002,"samples_per_traversal":[1,16,64]},
-      "experiments":[{"name":"e","rays":"single","samples_per_ray":10,"gate":{"enabled":false},
+      read_config(R"({"nullmark":"config/2","timing":{"repetitions":3,"seconds":0.002,"samples_per_traversal":[1,16,64]},
+      "experiments":[{"name":"e","rays":"single","samples_per_ray":10,"verdict":{"enabled":false},
       "matrix":{"estimator":"ratio","medium":"linear","majorant":{"type":"grid","resolution":64}}}]})",
                   "test.json");
   const CellRecord record = run_plan(cells, {true}, {}, {}, {}).at(0);

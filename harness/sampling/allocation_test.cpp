@@ -42,15 +42,15 @@ namespace nullmark {
 /// Ratio tracking that keeps its collisions in a fresh list each walk.
 template <class Value>
 struct Forgetful : RatioTracking<Value> {
-  using Ray = Passage<Value>;
+  using RayData = MediumRay<Value>;
   struct Walk : RatioTracking<Value>::Walk {
     std::vector<Real> positions;
   };
-  void init(Walk& walk, const Ray& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
     walk.positions = std::vector<Real>();
   }
-  void consume(Walk& walk, const Ray& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     RatioTracking<Value>::consume(walk, ray, at, extinction, rng);
     walk.positions.push_back(at.position());
   }
@@ -108,7 +108,7 @@ std::vector<Place> places() {
 std::uint64_t allocations_of(const Kernel& kernel, const Scene& scene, Quantity quantity) {
   constexpr std::size_t kSamples = 300;  // more than a block
   const auto workspace = kernel.workspace();
-  RayContext context;
+  PreparedRay context;
   SampleBlock block;
   Counters counters;
   std::uint64_t found = 0;

@@ -38,7 +38,7 @@ std::shared_ptr<const Value> once(std::map<Key, std::shared_ptr<const Value>>& c
 
 }  // namespace
 
-PreparedCell Workshop::prepare(std::size_t index) {
+PreparedCell CellPreparer::prepare(std::size_t index) {
   const Cell& cell = plan_.cells[index];
   PreparedCell prepared;
   prepared.cell = &cell;
@@ -75,7 +75,7 @@ PreparedCell Workshop::prepare(std::size_t index) {
 }
 
 /// The kernel of a radiance, composed from the scene's effects.
-void Workshop::add_light(PreparedCell& prepared, const EstimatorSource& source) const {
+void CellPreparer::add_light(PreparedCell& prepared, const EstimatorSource& source) const {
   const Cell& cell = *prepared.cell;
   const TransportScene light = located(plan_.media[cell.medium].field.pointer, [&] {
     return make_transport_scene(plan_.media[cell.medium], *prepared.scene->medium, prepared.scene->majorant->structure,
@@ -97,7 +97,7 @@ void Workshop::add_light(PreparedCell& prepared, const EstimatorSource& source) 
                                                              : SampleRange::non_negative;
 }
 
-std::string Workshop::why_not(const Cell& cell, const Scene& scene, const Kernel* made) {
+std::string CellPreparer::why_not(const Cell& cell, const Scene& scene, const Kernel* made) {
   const int channels = scene.medium->medium->channels();
   if (!made)
     return channels > 1 ? fmt::format("{} channels have no form in float; expected precision \"double\"", channels)
@@ -125,7 +125,7 @@ std::string Workshop::why_not(const Cell& cell, const Scene& scene, const Kernel
   return "";
 }
 
-Real Workshop::deepest_majorant(const Scene& scene) {
+Real CellPreparer::deepest_majorant(const Scene& scene) {
   const auto [known, fresh] = deepest_.try_emplace(&scene, 0);
   if (!fresh) return known->second;
   Real& deepest = known->second;
@@ -140,7 +140,7 @@ Real Workshop::deepest_majorant(const Scene& scene) {
   return deepest;
 }
 
-std::shared_ptr<const Scene> Workshop::scene(const Cell& cell) {
+std::shared_ptr<const Scene> CellPreparer::scene(const Cell& cell) {
   const bool told_at_marks = cell.quantity == Quantity::transmittance_profile || cell.quantity == Quantity::free_path;
   const std::size_t kind = told_at_marks ? static_cast<std::size_t>(cell.quantity) : 0;
   // Surfaces end rays; a radiance looks for them itself, along every leg of its paths.
@@ -175,11 +175,11 @@ std::shared_ptr<const Scene> Workshop::scene(const Cell& cell) {
   });
 }
 
-std::vector<PreparedCell> prepare_all(Workshop& workshop, const Plan& plan, const std::function<bool(std::size_t)>& wanted) {
+std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted) {
   expect_rays_fit(plan, wanted);
   std::vector<PreparedCell> cells;
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
-    if (wanted(i)) cells.push_back(workshop.prepare(i));
+    if (wanted(i)) cells.push_back(preparer.prepare(i));
   return cells;
 }
 

@@ -23,7 +23,7 @@ struct PreparedCell {
   Targets targets;
   CellTheory theory;
   std::uint64_t samples_per_ray = 0;
-  Claim claim = Claim::unbiased;
+  Guarantee claim = Guarantee::unbiased;
   SampleRange range = SampleRange::any_sign;
   bool needs_bound = false;
 
@@ -35,9 +35,9 @@ struct PreparedCell {
 };
 
 /// Builds media, majorant structures, rays and references once each, on demand.
-class Workshop {
+class CellPreparer {
  public:
-  explicit Workshop(const Plan& plan) : plan_(plan) {}
+  explicit CellPreparer(const Plan& plan) : plan_(plan) {}
 
   /// A cell of the plan, by its place there, all but its theory.  Throws ParameterError (with a JSON pointer as `parameter`) for
   /// specifications that do not fit their medium.
@@ -62,7 +62,7 @@ class Workshop {
 };
 
 /// The cells of a plan that `wanted` picks, by their place there.
-std::vector<PreparedCell> prepare_all(Workshop& workshop, const Plan& plan, const std::function<bool(std::size_t)>& wanted);
+std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted);
 
 /// Theory of all cells that can run, scene by scene; a measurement stage changes the law of the samples, so those cells have
 /// none. Where samples are planned by lookups, their number follows from it.

@@ -70,7 +70,7 @@ std::vector<Chunk> cut(std::size_t rays, std::uint64_t samples, std::uint64_t ch
 /// The threads' private memory.
 struct Scratch {
   std::unique_ptr<Workspace> workspace;
-  RayContext context;
+  PreparedRay context;
   SampleBlock block;
   std::vector<Real> errors, finite;
 };
@@ -133,7 +133,7 @@ Real measured(Real value, const Measurement& measurement) {
 }
 
 std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
-                                   SampleSpan span, const CellGate* gate, const std::function<bool()>& stop,
+                                   SampleSpan span, const TestPlan* plan, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress) {
   const std::size_t rays = scene.rays->local.size();
   const std::size_t outputs = targets.outputs;
@@ -150,8 +150,8 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   result.lookups_squared.resize(rays);
   result.groups.resize(outputs);
 
-  if (gate) result.evidence.resize(gate->tests.size());
-  if (gate) result.variances.resize(gate->variances.size());
+  if (plan) result.evidence.resize(plan->tests.size());
+  if (plan) result.variances.resize(plan->variances.size());
   if (span.keep) result.kept = KeptSamples(rays, span.first, span.per_ray, outputs);
 
   std::vector<ChunkResult> results(chunks.size());
@@ -168,8 +168,8 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   // Fills `errors` of an output, 0 for samples that are not finite, and tells those that count.
   constexpr Real kLargest = std::numeric_limits<Real>::max();
   const Real slack = cell.precision == Precision::float64 ? kRangeSlack : kSingleRangeSlack;
-  const Real low = gate ? std::max(gate->low - slack, -kLargest) : -kLargest;
-  const Real high = gate ? std::min(gate->high + slack, kLargest) : kLargest;
+  const Real low = plan ? std::max(plan->low - slack, -kLargest) : -kLargest;
+  const Real high = plan ? std::min(plan->high + slack, kLargest) : kLargest;
   const bool as_drawn = cell.measurement == Measurement{};
   const auto take_errors = [&](Scratch& mine, std::size_t o, Real target, std::span<Real> errors,
                                ChunkResult& out) -> std::span<const Real> {
@@ -216,10 +216,10 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
     out.blocks.resize(outputs);
     out.group_sums.assign(outputs, 0);
     const auto begun = Clock::now();
-    const bool varies = gate && !gate->variances.empty() && !span.only_evidence;
-    const std::span<const MeanTest> tests = gate ? gate->tests : std::span<const MeanTest>();
-    EvidenceAccumulator evidences(gate, tests, outputs, EvidenceAccumulator::Memory::of_this_thread(), out.evidence);
-    EvidenceAccumulator variances(gate, varies ? gate->variances : std::span<const MeanTest>(), outputs,
+    const bool varies = plan && !plan->variances.empty() && !span.only_evidence;
+    const std::span<const MeanTest> tests = plan ? plan->tests : std::span<const MeanTest>();
+    EvidenceAccumulator evidences(plan, tests, outputs, EvidenceAccumulator::Memory::of_this_thread(), out.evidence);
+    EvidenceAccumulator variances(plan, varies ? plan->variances : std::span<const MeanTest>(), outputs,
                                   EvidenceAccumulator::Memory::of_variances(), out.variances);
     for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
       scene.context(ray, kernel, mine.context);
@@ -244,13 +244,13 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
         }
         if (!span.only_evidence) out.lookups_squared[local] += sum_of_squares(mine.block.lookups);
         const auto counted_at = Clock::now();
-        for (std::size_t o = 0; o < outputs && gate; ++o) {
+        for (std::size_t o = 0; o < outputs && plan; ++o) {
           const std::span<Real> errors(&mine.errors[o * batch], batch);
-          if (const Real shift = gate->shift[ray * outputs + o]; shift != 0)
+          if (const Real shift = plan->shift[ray * outputs + o]; shift != 0)
             for (Real& error : errors) error -= shift;
           evidences.add_errors(ray, o, errors);
           if (!varies) continue;
-          for (Real& error : errors) error = error * error - gate->stated_variance[ray * outputs + o];
+          for (Real& error : errors) error = error * error - plan->stated_variance[ray * outputs + o];
           variances.add_errors(ray, o, errors);
         }
         evidences.add_lookups(ray, mine.block.lookups);

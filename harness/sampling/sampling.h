@@ -24,8 +24,8 @@ struct Sampled {
   Counters counters;
   std::uint64_t nonfinite = 0, out_of_range = 0;
   Real largest = 0;                 ///< max |X| of the finite samples
-  std::vector<Evidence> evidence;   ///< one per test of the gate
-  std::vector<Evidence> variances;  ///< one per variance that the gate tests; none of samples that are evidence alone
+  std::vector<Evidence> evidence;   ///< one per test of the plan
+  std::vector<Evidence> variances;  ///< one per variance that the plan tests; none of samples that are evidence alone
   KeptSamples kept;                 ///< where the span asks for them
   /// Of all threads: evidence alone; all that is done with samples once they are drawn; everything.
   double judging_seconds = 0, statistics_seconds = 0, working_seconds = 0;
@@ -42,10 +42,10 @@ struct SampleSpan {
 Real measured(Real value, const Measurement& measurement);
 
 /// Draws every sample of the cell with TBB's threads.  Chunks are cut by the plan alone and merged in their order.  `stop` is
-/// asked between chunks; the result is empty where it answered true.  Evidence is gathered for the gate's tests where there is
+/// asked between chunks; the result is empty where it answered true.  Evidence is gathered for the plan's tests where there is
 /// one.
 std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
-                                   SampleSpan span, const CellGate* gate, const std::function<bool()>& stop,
+                                   SampleSpan span, const TestPlan* plan, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress);
 
 }  // namespace nullmark

@@ -23,9 +23,9 @@ class GivenSamples final : public Kernel {
   bool states_theory() const override { return false; }
   bool answers(Quantity) const override { return true; }
   std::unique_ptr<Workspace> workspace() const override { return std::make_unique<Workspace>(); }
-  std::size_t outputs(Quantity, const RayContext&) const override { return 1; }
-  void begin_ray(Workspace&, const Medium&, const Extrema&, const RayContext&) const override {}
-  void sample(Workspace&, const Medium&, const RayContext& ray, std::uint64_t, std::uint64_t first, std::size_t count, Quantity,
+  std::size_t outputs(Quantity, const PreparedRay&) const override { return 1; }
+  void begin_ray(Workspace&, const Medium&, const Extrema&, const PreparedRay&) const override {}
+  void sample(Workspace&, const Medium&, const PreparedRay& ray, std::uint64_t, std::uint64_t first, std::size_t count, Quantity,
               SampleBlock& out, Counters& counters) const override {
     out.values.resize(count);
     out.lookups.assign(count, ray.index + 1);
@@ -48,13 +48,13 @@ constexpr std::size_t kRays = 48;
 constexpr std::size_t kGroups = 3;
 
 /// Enough rays for several in a chunk, in three groups one after the other.
-struct Place {
+struct JsonNode {
   Cell cell;
   Scene scene;
   Targets targets;
-  CellGate gate;
+  TestPlan test_plan;
 
-  Place() {
+  JsonNode() {
     MediumSpec homogeneous;
     homogeneous.field = {"homogeneous", {}, "homogeneous", {}};
     scene.medium = std::make_shared<BuiltMedium>(build_medium(homogeneous));
@@ -65,12 +65,12 @@ struct Place {
     scene.rays = rays;
     targets.mean.assign(kRays, kTarget);
     targets.error.assign(kRays, 0);
-    gate.shift.assign(kRays, 0);
-    gate.low = 0;
-    gate.high = 1;
+    test_plan.shift.assign(kRays, 0);
+    test_plan.low = 0;
+    test_plan.high = 1;
     for (std::size_t ray = 0; ray < kRays; ++ray) {
-      gate.group_of.push_back(static_cast<int>(ray * kGroups / kRays));
-      gate.lookups.push_back(static_cast<Real>(ray) + 0.75);  // a quarter less than there are
+      test_plan.group_of.push_back(static_cast<int>(ray * kGroups / kRays));
+      test_plan.lookups.push_back(static_cast<Real>(ray) + 0.75);  // a quarter less than there are
     }
     add_test(0, MeanTest::kAllRays, 4);
     add_test(0, 0, 1);
@@ -89,17 +89,17 @@ struct Place {
     // Longer sums are made of the shorter ones.
     bets.push_back({Role::fail, {Bet::Kind::betting, 1, 0, 0, {kRate}, 4 * errors_per_sum}});
     test.place(std::move(bets));
-    gate.tests.push_back(std::move(test));
+    test_plan.tests.push_back(std::move(test));
   }
 
   /// Whether a ray's errors enter a test.
   bool takes(const MeanTest& test, std::size_t ray) const {
-    return test.group == MeanTest::kAllRays || gate.group_of[ray] == test.group;
+    return test.group == MeanTest::kAllRays || test_plan.group_of[ray] == test.group;
   }
 
   Sampled sample(const GivenSamples& kernel, SampleSpan span) const {
     return *sample_cell(
-        cell, scene, kernel, targets, span, &gate, [] { return false; }, [](double) {});
+        cell, scene, kernel, targets, span, &test_plan, [] { return false; }, [](double) {});
   }
 };
 
@@ -108,14 +108,14 @@ constexpr std::uint64_t kSpans[] = {16, 1024, 16384, 65536};
 
 /// Where all samples of a ray are alike, it makes no difference which of them share a sum.
 TEST(SampleCell, EveryTestGetsSumsOfAsManyErrorsAsItAsksFor) {
-  const Place place;
+  const JsonNode place;
   const auto error = [](std::size_t ray) { return (static_cast<Real>(ray % 7) - 2.5) / 10; };
   const GivenSamples kernel([&](std::uint32_t ray, std::uint64_t) { return kTarget + error(ray); });
   for (const std::uint64_t samples : kSpans) {
     const Sampled sampled = place.sample(kernel, {.per_ray = samples});
-    ASSERT_EQ(sampled.evidence.size(), place.gate.tests.size());
+    ASSERT_EQ(sampled.evidence.size(), place.test_plan.tests.size());
     for (std::size_t i = 0; i < sampled.evidence.size(); ++i) {
-      const MeanTest& test = place.gate.tests[i];
+      const MeanTest& test = place.test_plan.tests[i];
       std::uint64_t errors = 0;
       std::vector<long double> logs(test.bets.size());
       long double total = 0;
@@ -144,8 +144,8 @@ TEST(SampleCell, EveryTestGetsSumsOfAsManyErrorsAsItAsksFor) {
 /// At small rates a bet's logarithm is the sum of all errors: none is left out and none counted twice.
 TEST(SampleCell, EveryErrorIsInOneSum) {
   constexpr Real kSmall = 1e-7, kRounding = 0x1p-52;
-  Place place;
-  for (MeanTest& test : place.gate.tests)
+  JsonNode place;
+  for (MeanTest& test : place.test_plan.tests)
     for (auto& [role, bet] : test.bets) bet.rates = {kSmall};
   const auto error = [](std::uint64_t ray, std::uint64_t sample) {
     return Rng(SampleAddress{7, static_cast<std::uint32_t>(ray), sample}).uniform() - 0.4;
@@ -154,7 +154,7 @@ TEST(SampleCell, EveryErrorIsInOneSum) {
   for (const std::uint64_t samples : {16u, 1024u, 32768u}) {
     const Sampled sampled = place.sample(kernel, {.first = 5, .per_ray = samples});
     for (std::size_t i = 0; i < 4; ++i) {
-      const MeanTest& test = place.gate.tests[i];
+      const MeanTest& test = place.test_plan.tests[i];
       Real sum = 0, squares = 0, errors = 0;
       for (std::size_t ray = 0; ray < kRays; ++ray)
         for (std::uint64_t k = 0; k < samples && place.takes(test, ray); ++k) {
@@ -175,7 +175,7 @@ TEST(SampleCell, EveryErrorIsInOneSum) {
 
 /// What is not asked for costs nothing of what is: verdicts do not depend on it.
 TEST(SampleCell, EvidenceAloneIsTheSameEvidence) {
-  const Place place;
+  const JsonNode place;
   const GivenSamples kernel([](std::uint32_t ray, std::uint64_t sample) {
     if (ray == 11 && sample % 5 == 3) return std::numeric_limits<Real>::quiet_NaN();
     if (ray == 30 && sample % 64 == 1) return 1.5;
@@ -198,7 +198,7 @@ TEST(SampleCell, EvidenceAloneIsTheSameEvidence) {
     }
     EXPECT_EQ(all.moments[11].count, samples - nonfinite);
     EXPECT_EQ(only.moments[11].count, 0u);
-    for (std::size_t i = 0; i < place.gate.tests.size(); ++i) {
+    for (std::size_t i = 0; i < place.test_plan.tests.size(); ++i) {
       EXPECT_EQ(all.evidence[i].logs, only.evidence[i].logs) << i;
       EXPECT_EQ(all.evidence[i].errors, only.evidence[i].errors) << i;
     }

@@ -211,7 +211,7 @@ Marks compute_marks(const BuiltMedium& medium, const BuiltRays& rays, Quantity q
   return marks;
 }
 
-void Scene::context(std::size_t ray, const Kernel& kernel, RayContext& out) const {
+void Scene::context(std::size_t ray, const Kernel& kernel, PreparedRay& out) const {
   out.world = rays->world[ray];
   out.local = rays->local[ray];
   out.index = static_cast<std::uint32_t>(ray);

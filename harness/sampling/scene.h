@@ -76,7 +76,7 @@ struct Scene {
   bool exceeds_bound = false;          ///< the extinction was seen above the majorant at a point of a ray
 
   /// Fills the context of a ray with what the kernel needs.
-  void context(std::size_t ray, const Kernel& kernel, RayContext& out) const;
+  void context(std::size_t ray, const Kernel& kernel, PreparedRay& out) const;
 };
 
 /// Whether the majorant bounds the extinction in every segment of every ray.

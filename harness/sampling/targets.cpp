@@ -13,7 +13,7 @@ namespace {
 
 struct Memory {
   std::unique_ptr<Workspace> workspace;
-  RayContext context;
+  PreparedRay context;
 };
 
 std::vector<std::string> with_channels(const std::vector<std::string>& names, std::size_t channels) {

@@ -115,9 +115,9 @@ EvidenceAccumulator::Memory& EvidenceAccumulator::Memory::of_variances() {
   return memory;
 }
 
-EvidenceAccumulator::EvidenceAccumulator(const CellGate* gate, std::span<const MeanTest> tests, std::size_t channels,
+EvidenceAccumulator::EvidenceAccumulator(const TestPlan* plan, std::span<const MeanTest> tests, std::size_t channels,
                                          Memory& memory, std::map<std::size_t, Evidence>& out)
-    : gate_(gate), tests_(tests), out_(out), pooled_(channels), grouped_(channels), pending_(memory.pending), sums_(memory.sums) {
+    : plan_(plan), tests_(tests), out_(out), pooled_(channels), grouped_(channels), pending_(memory.pending), sums_(memory.sums) {
   pending_.resize(std::max(pending_.size(), tests_.size()));
   for (std::vector<std::vector<Real>>& lengths : pending_)
     for (std::vector<Real>& waiting : lengths) waiting.clear();  // of a run that was stopped
@@ -162,12 +162,12 @@ void EvidenceAccumulator::add_errors(std::size_t ray, std::size_t channel, std::
     return most;
   };
   add_to(*pooled_[channel], errors, 0, largest);
-  if (!grouped_[channel].empty()) add_to(*grouped_[channel][static_cast<std::size_t>(gate_->group_of[ray])], errors, 0, largest);
+  if (!grouped_[channel].empty()) add_to(*grouped_[channel][static_cast<std::size_t>(plan_->group_of[ray])], errors, 0, largest);
 }
 
 void EvidenceAccumulator::add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups) {
   if (!lookups_ || lookups.empty()) return;
-  const Real expected = gate_->lookups[ray];
+  const Real expected = plan_->lookups[ray];
   add_to(*lookups_, lookups, expected, [&] {
     const auto [least, most] = std::minmax_element(lookups.begin(), lookups.end());
     return std::max(expected - *least, *most - expected);

@@ -39,8 +39,8 @@ class EvidenceAccumulator {
     static Memory& of_variances();
   };
 
-  /// Evidence of `tests`, which are those of the mean or of the variance in `gate`, is added to `out`, by test.
-  EvidenceAccumulator(const CellGate* gate, std::span<const MeanTest> tests, std::size_t channels, Memory& memory,
+  /// Evidence of `tests`, which are those of the mean or of the variance in `plan`, is added to `out`, by test.
+  EvidenceAccumulator(const TestPlan* plan, std::span<const MeanTest> tests, std::size_t channels, Memory& memory,
                       std::map<std::size_t, Evidence>& out);
 
   void add_errors(std::size_t ray, std::size_t channel, std::span<const Real> errors);
@@ -55,7 +55,7 @@ class EvidenceAccumulator {
   void feed(std::size_t test, std::size_t length, std::span<const Real> sums);
   void flush(std::size_t test, std::size_t length);
 
-  const CellGate* gate_;
+  const TestPlan* plan_;
   std::span<const MeanTest> tests_;
   std::map<std::size_t, Evidence>& out_;
   std::vector<std::optional<std::size_t>> pooled_;                // test by channel

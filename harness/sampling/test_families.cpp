@@ -30,7 +30,7 @@ constexpr std::uint64_t kClaims = 2;
 std::uint64_t mean_family(const Plan& plan) {
   std::uint64_t tests = 0;
   for (const Cell& cell : plan.cells)
-    if (cell.gate.enabled)
+    if (cell.verdict.enabled)
       tests += channels_of(plan.media[cell.medium]) * outputs_per_channel(cell.quantity) *
                (1 + possible_groups(plan.ray_sets[cell.rays])) * kClaims;
   return std::max<std::uint64_t>(1, tests);
@@ -38,7 +38,7 @@ std::uint64_t mean_family(const Plan& plan) {
 
 std::uint64_t lookups_family(const Plan& plan) {
   std::uint64_t tests = 0;
-  for (const Cell& cell : plan.cells) tests += kClaims * cell.gate.enabled;
+  for (const Cell& cell : plan.cells) tests += kClaims * cell.verdict.enabled;
   return std::max<std::uint64_t>(1, tests);
 }
 

@@ -51,7 +51,7 @@ constexpr Real kOfFlights = 2e-3, kRareScore = 1e-4;
 /// Smaller where a score is rare, or nearly always given, or a tracker that never scores it would pass.  A weight's mean is 1.
 Real score_epsilon(const Cell& cell, Real mean) {
   constexpr Real kOfScore = 0.25, kNever = 1e-9;
-  const Real margin = cell.gate.epsilon.value_or(kOfFlights), rare = std::min(mean, 1 - mean);
+  const Real margin = cell.verdict.epsilon.value_or(kOfFlights), rare = std::min(mean, 1 - mean);
   return rare < kNever ? margin : std::max(std::min(margin, kOfScore * rare), kRareScore);
 }
 
@@ -62,7 +62,7 @@ Real absolute_epsilon(const Cell& cell, Real mean) {
   // A mean that has underflowed has no part of itself.
   const Real least = 16 * least_of(cell.precision);
   if (!(std::abs(mean) > least)) return least;
-  if (cell.gate.epsilon) return *cell.gate.epsilon * mean;
+  if (cell.verdict.epsilon) return *cell.verdict.epsilon * mean;
   if (cell.quantity == Quantity::optical_depth || cell.quantity == Quantity::radiance) return 0.01 * std::abs(mean);
   const Real margin = default_epsilon(mean) * mean, absorbed = 1 - mean;
   constexpr Real kOfAbsorbed = 0.1;
@@ -119,55 +119,55 @@ void MeanTest::place(std::vector<std::pair<Role, Bet>> placed) {
 namespace {
 
 /// Plans the tests of one cell.
-class GatePlanner {
+class TestPlanner {
  public:
-  GatePlanner(const Cell& cell, const Scene& scene, const Targets& targets, Claim claim, const CellTheory& theory,
+  TestPlanner(const Cell& cell, const Scene& scene, const Targets& targets, Guarantee claim, const CellTheory& theory,
               const std::optional<Pilot>& pilot, const TestLevels& levels)
       : cell_(cell), targets_(targets), theory_(theory), pilot_(pilot), levels_(levels), rays_(scene.rays->world.size()) {
-    const bool own_mean = claim == Claim::consistent || claim == Claim::biased;
-    gate_.against = own_mean ? "own mean" : "reference";
-    gate_.group_of = ray_groups(*scene.rays);
-    gate_.shift.assign(rays_ * targets.outputs, 0);
-    if (own_mean && !theory.ray_shift.empty()) gate_.shift = theory.ray_shift;
+    const bool own_mean = claim == Guarantee::consistent || claim == Guarantee::biased;
+    plan_.against = own_mean ? "own mean" : "reference";
+    plan_.group_of = ray_groups(*scene.rays);
+    plan_.shift.assign(rays_ * targets.outputs, 0);
+    if (own_mean && !theory.ray_shift.empty()) plan_.shift = theory.ray_shift;
     analytic_ = !theory.ray_variance.empty();
-    gate_.variance_basis = analytic_ ? "analytic" : pilot ? "pilot" : "none";
+    plan_.variance_basis = analytic_ ? "analytic" : pilot ? "pilot" : "none";
     // A free path is drawn, whatever its law is known by.
-    exact_ = claim == Claim::exact && cell.quantity != Quantity::free_path && cell.quantity != Quantity::radiance;
+    exact_ = claim == Guarantee::exact && cell.quantity != Quantity::free_path && cell.quantity != Quantity::radiance;
     most_per_sum_ = static_cast<int>(std::min<std::uint64_t>(64, largest_power_of_two_divisor(cell.samples_per_ray)));
-    gate_.longest_sum = static_cast<std::uint64_t>(most_per_sum_);
+    plan_.longest_sum = static_cast<std::uint64_t>(most_per_sum_);
     mean_lookups_ = theory.lookups.value_or(pilot && pilot->samples > 0
                                                 ? static_cast<Real>(pilot->lookups) / static_cast<Real>(pilot->samples)
                                                 : theory.majorant_depth);
   }
 
-  CellGate plan(SampleRange range, bool bounding) {
+  TestPlan plan(SampleRange range, bool bounding) {
     state_range(range, bounding);
     allow();
-    if (!analytic_ && !pilot_ && !exact_) return std::move(gate_);
+    if (!analytic_ && !pilot_ && !exact_) return std::move(plan_);
     for (std::size_t o = 0; o < targets_.outputs; ++o) add_means(o);
     judge_plan();
     add_lookups();
     add_variances(range, bounding);
-    return std::move(gate_);
+    return std::move(plan_);
   }
 
  private:
   /// Where the majorant does not bound, ranges that rest on it are not claimed.
   void state_range(SampleRange range, bool bounding) {
     if (cell_.quantity == Quantity::optical_depth || (!bounding && range != SampleRange::binary)) range = SampleRange::any_sign;
-    if (range != SampleRange::any_sign) gate_.low = 0;
-    if (range == SampleRange::binary || range == SampleRange::unit) gate_.high = 1;
+    if (range != SampleRange::any_sign) plan_.low = 0;
+    if (range == SampleRange::binary || range == SampleRange::unit) plan_.high = 1;
   }
 
   /// What the configuration lets a ray cost.
   void allow() {
-    const std::uint64_t n = cell_.samples_per_ray, most = std::max(n, cell_.gate.max_samples_per_ray);
-    gate_.affordable = most;
-    gate_.allowance = cell_.gate.max_samples_per_ray == 0 ? kPatience * n : most;
-    if (!cell_.gate.max_lookups_per_ray || !(mean_lookups_ > 0)) return;
-    const auto paid = static_cast<std::uint64_t>(std::min<Real>(9e15, *cell_.gate.max_lookups_per_ray / mean_lookups_));
-    gate_.affordable = std::max(n, std::min(most, paid));
-    gate_.allowance = std::max(n, std::min(gate_.allowance, paid));
+    const std::uint64_t n = cell_.samples_per_ray, most = std::max(n, cell_.verdict.max_samples_per_ray);
+    plan_.affordable = most;
+    plan_.allowance = cell_.verdict.max_samples_per_ray == 0 ? kMostSampleFactor * n : most;
+    if (!cell_.verdict.max_lookups_per_ray || !(mean_lookups_ > 0)) return;
+    const auto paid = static_cast<std::uint64_t>(std::min<Real>(9e15, *cell_.verdict.max_lookups_per_ray / mean_lookups_));
+    plan_.affordable = std::max(n, std::min(most, paid));
+    plan_.allowance = std::max(n, std::min(plan_.allowance, paid));
   }
 
   /// A pilot's variance is trusted for bets that rest on it where samples have no range and their variance showed no heavy tail.
@@ -182,7 +182,7 @@ class GatePlanner {
     std::vector<Pool> pools(rays_ < static_cast<std::size_t>(kRayGroups) ? 1 : 1 + kRayGroups);
     for (std::size_t ray = 0; ray < rays_; ++ray) {
       const std::size_t at = ray * targets_.outputs + output;
-      const Real mean = targets_.mean[at] + gate_.shift[at];
+      const Real mean = targets_.mean[at] + plan_.shift[at];
       const auto add = [&](Pool& pool) {
         ++pool.rays;
         pool.mean += mean;
@@ -192,7 +192,7 @@ class GatePlanner {
         pool.most = std::max(pool.most, mean);
       };
       add(pools[0]);
-      if (pools.size() > 1) add(pools[static_cast<std::size_t>(gate_.group_of[ray]) + 1]);
+      if (pools.size() > 1) add(pools[static_cast<std::size_t>(plan_.group_of[ray]) + 1]);
     }
     for (Pool& pool : pools) pool.mean /= static_cast<Real>(pool.rays);
     return pools;
@@ -224,9 +224,9 @@ class GatePlanner {
       if (!analytic_ && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
       // Far below epsilon a variance decides nothing, and theory's may be rounding.
       if (!test.deterministic) test.variance = std::max(test.variance, test.epsilon * test.epsilon / 4);
-      place(test, {pool.most - gate_.low, gate_.high - pool.least, test.variance, basis(), test.reference_error});
+      place(test, {pool.most - plan_.low, plan_.high - pool.least, test.variance, basis(), test.reference_error});
       demand(test, pool);
-      gate_.tests.push_back(std::move(test));
+      plan_.tests.push_back(std::move(test));
     }
   }
 
@@ -249,40 +249,40 @@ class GatePlanner {
   /// What the test of a mean asks of the cell.
   void demand(const MeanTest& test, const Pool& pool) {
     if (test.reference_error > 0.25 * test.epsilon)
-      gate_.undecidable =
+      plan_.undecidable =
           fmt::format("the reference's own error {:.2g} is too coarse for epsilon {:.2g}", test.reference_error, test.epsilon);
     if (test.deterministic || test.basis == "none") return;
-    gate_.planned = std::max(gate_.planned, test.planned);
+    plan_.planned = std::max(plan_.planned, test.planned);
     if (test.sure <= sure_) return;
     sure_ = test.sure;
     // Relative to a mean that has underflowed nothing can be said.
     const Real mean = std::max(std::abs(pool.mean), least_of(cell_.precision));
     needs_ = fmt::format("not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} (relative variance {:.2g})",
-                         gate_.affordable, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
+                         plan_.affordable, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
     tight_ = fmt::format(
         "perhaps not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} with a chance of .95, and {:.2g} to be "
         "sure",
-        gate_.allowance, test.epsilon / mean, static_cast<double>(test.planned), static_cast<double>(test.sure));
+        plan_.allowance, test.epsilon / mean, static_cast<double>(test.planned), static_cast<double>(test.sure));
   }
 
   /// Whether the samples allowed decide the mean, and what is missing where they do not.
   void judge_plan() {
-    const bool one_sided = std::any_of(gate_.tests.begin(), gate_.tests.end(), [](const MeanTest& test) {
+    const bool one_sided = std::any_of(plan_.tests.begin(), plan_.tests.end(), [](const MeanTest& test) {
       const auto has = [&](Role role) {
         return std::any_of(test.bets.begin(), test.bets.end(), [&](const auto& placed) { return placed.first == role; });
       };
       return !test.deterministic && !(has(Role::low) && has(Role::high));
     });
     if (one_sided) {
-      gate_.undecidable =
+      plan_.undecidable =
           theory_.infinite_variance
               ? "the variance is infinite: no number of samples decides the mean"
               : fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
                             pilot_->variance_of_variance);
       if (!theory_.infinite_variance)
-        gate_.remedies = "state a range of the samples (kRange), their variance (theory), or the guarantee \"exact\"";
-    } else if (gate_.undecidable.empty() && sure_ > gate_.allowance) {
-      gate_.undecidable = gate_.planned > gate_.affordable ? needs_ : tight_;
+        plan_.remedies = "state a range of the samples (kRange), their variance (theory), or the guarantee \"exact\"";
+    } else if (plan_.undecidable.empty() && sure_ > plan_.allowance) {
+      plan_.undecidable = plan_.planned > plan_.affordable ? needs_ : tight_;
     }
   }
 
@@ -290,7 +290,7 @@ class GatePlanner {
   void add_lookups() {
     const bool known_spread = !theory_.ray_lookups_variance.empty();
     if (theory_.ray_lookups.empty() || !(known_spread || pilot_)) return;
-    gate_.lookups = theory_.ray_lookups;
+    plan_.lookups = theory_.ray_lookups;
     Pool pool;
     for (std::size_t ray = 0; ray < rays_; ++ray) {
       pool.mean += theory_.ray_lookups[ray];
@@ -319,23 +319,23 @@ class GatePlanner {
     using Basis = ErrorLaw::Basis;
     const Basis basis = known_spread ? Basis::analytic : seen ? Basis::pilot : Basis::none;
     place(test, {pool.most, kInfinity, test.variance, basis, test.reference_error});
-    gate_.tests.push_back(std::move(test));
+    plan_.tests.push_back(std::move(test));
   }
 
   /// Tests of the variance that theory states, E[(X - mu0)^2] = v: from below for any samples, from above where they have a
   /// range. Samples of 0 and 1 need none, their variance follows from their mean.
   void add_variances(SampleRange range, bool bounding) {
     if (!analytic_ || (range == SampleRange::binary && bounding)) return;
-    for (const MeanTest& mean : gate_.tests) {
+    for (const MeanTest& mean : plan_.tests) {
       if (mean.channel < 0 || mean.group != MeanTest::kAllRays || mean.deterministic) continue;
-      Real most = 0, highest = std::isfinite(gate_.high) ? 0 : kInfinity, total = 0, reference = 0;
+      Real most = 0, highest = std::isfinite(plan_.high) ? 0 : kInfinity, total = 0, reference = 0;
       for (std::size_t ray = 0; ray < rays_; ++ray) {
         const std::size_t at = ray * targets_.outputs + static_cast<std::size_t>(mean.channel);
-        const Real v = theory_.ray_variance[at], mu = targets_.mean[at] + gate_.shift[at];
+        const Real v = theory_.ray_variance[at], mu = targets_.mean[at] + plan_.shift[at];
         most = std::max(most, v);
         total += v;
         reference = std::max(reference, targets_.error[at]);
-        const Real far = std::max(gate_.high - mu, mu - gate_.low);
+        const Real far = std::max(plan_.high - mu, mu - plan_.low);
         highest = std::max(highest, far * far - v);
       }
       // A variance near rounding is one of the tracker's arithmetic.
@@ -347,9 +347,9 @@ class GatePlanner {
       test.rays = rays_;
       const Real slack = kTheoryError * most + reference * reference + mean.rounding * mean.rounding;
       test.place(place_blind_bets({most, highest, 0, ErrorLaw::Basis::none, slack}, most_per_sum_));
-      gate_.variances.push_back(std::move(test));
+      plan_.variances.push_back(std::move(test));
     }
-    if (!gate_.variances.empty()) gate_.stated_variance = theory_.ray_variance;
+    if (!plan_.variances.empty()) plan_.stated_variance = theory_.ray_variance;
   }
 
   const Cell& cell_;
@@ -363,14 +363,14 @@ class GatePlanner {
   Real mean_lookups_ = 0;
   std::uint64_t sure_ = 0;
   std::string needs_, tight_;
-  CellGate gate_;
+  TestPlan plan_;
 };
 
 }  // namespace
 
-CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Claim claim,
-                   const CellTheory& theory, const std::optional<Pilot>& pilot, const TestLevels& levels) {
-  return GatePlanner(cell, scene, targets, claim, theory, pilot, levels).plan(range, scene.bounding);
+TestPlan plan_tests(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Guarantee claim,
+                    const CellTheory& theory, const std::optional<Pilot>& pilot, const TestLevels& levels) {
+  return TestPlanner(cell, scene, targets, claim, theory, pilot, levels).plan(range, scene.bounding);
 }
 
 }  // namespace nullmark

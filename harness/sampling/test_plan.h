@@ -18,7 +18,7 @@ namespace nullmark {
 inline constexpr int kRayGroups = 16;
 
 /// Where the configuration names no allowance, a cell that is decidable by its samples may draw so many times as many.
-inline constexpr std::uint64_t kPatience = 4;
+inline constexpr std::uint64_t kMostSampleFactor = 4;
 
 /// The group of each ray; all 0 where there are too few rays for groups.
 std::vector<int> ray_groups(const BuiltRays& rays);
@@ -46,7 +46,7 @@ struct MeanTest {
 };
 
 /// What a cell's samples are judged by.
-struct CellGate {
+struct TestPlan {
   std::vector<MeanTest> tests;
   /// Of outputs whose stated variance is tested: errors are squared distances to the expected mean less that variance.
   std::vector<MeanTest> variances;
@@ -76,13 +76,13 @@ struct Pilot {
 
 /// What tests are planned for.
 struct TestLevels {
-  Real alpha_pass = GateLevels{}.alpha_pass;
+  Real alpha_pass = ErrorRates{}.alpha_pass;
   std::uint64_t tests = 1;  ///< of means, in the whole configuration
 };
 
 /// Plans the tests of a cell.  Where the majorant does not bound, ranges that rest on it are not claimed.  `pilot` serves where
 /// theory has no variance.
-CellGate plan_gate(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Claim claim,
-                   const CellTheory& theory, const std::optional<Pilot>& pilot, const TestLevels& levels);
+TestPlan plan_tests(const Cell& cell, const Scene& scene, const Targets& targets, SampleRange range, Guarantee claim,
+                    const CellTheory& theory, const std::optional<Pilot>& pilot, const TestLevels& levels);
 
 }  // namespace nullmark

@@ -57,7 +57,7 @@ RayTheories::RayTheories(const Scene& scene, const std::vector<TheoryQuery>& que
       majorant_depth_(scene.rays->local.size()) {
   struct Memory {
     std::vector<std::unique_ptr<Workspace>> workspaces;
-    RayContext context;
+    PreparedRay context;
   };
   tbb::enumerable_thread_specific<Memory> memory([&] {
     Memory mine;

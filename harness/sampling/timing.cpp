@@ -113,7 +113,7 @@ void run_cell(benchmark::State& state, const TimedCell& timed, const std::vector
   const std::uint64_t key = stream_key(*timed.cell, *timed.scene->medium);
   const Medium& medium = *timed.scene->medium->medium;
   const auto workspace = timed.kernel->workspace();
-  RayContext context;
+  PreparedRay context;
   SampleBlock block;
   Counters counters;
   std::uint64_t first = 0;

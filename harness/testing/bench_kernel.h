@@ -51,7 +51,7 @@ class KernelBench {
   Scene scene_;
   std::unique_ptr<const Kernel> kernel_;
   std::unique_ptr<Workspace> workspace_;
-  RayContext context_;
+  PreparedRay context_;
   SampleBlock block_;
   Counters counters_;
 };

@@ -13,7 +13,7 @@ template <template <class> class Estimator, class Value = Real>
 class HandWalked {
  public:
   using E = Estimator<Value>;
-  using Passage = typename detail::RayOf<E, Value>::type;
+  using MediumRay = typename detail::RayDataOf<E, Value>::type;
 
   struct Outcome {
     Event<Value> event;
@@ -109,7 +109,7 @@ class HandWalked {
   Theory theory(int channel = 0) const { return estimator.theory(ray, profile(), channel, Quantity::transmittance); }
 
   E estimator;
-  Passage ray;
+  MediumRay ray;
 
  private:
   Value looked_up(const typename E::Walk& walk, const Flight& at) const {

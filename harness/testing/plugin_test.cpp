@@ -103,7 +103,7 @@ TEST_F(Plugin, ExampleKeepsItsClaimsAndServesEveryCommand) {
 /// A volume is read by the plug-in's own executable over again.
 TEST_F(Plugin, ExampleReadsVolumes) {
   ASSERT_EQ(run(example() + "make-volume v.vdb --resolution 16"), 0) << read("err");
-  write("v.json", R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"v","rays":"single",
+  write("v.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"v","rays":"single",
       "samples_per_ray":100,"matrix":{"estimator":["ratio","roulette_ratio"],"medium":{"type":"vdb","file":"v.vdb"}}}]})");
   ASSERT_EQ(run(example() + "run v.json -o r.json"), 0) << read("err");
   for (const CellRecord& record : results("r.json").cells) EXPECT_EQ(record.status, Status::ok) << record.reason;
@@ -114,7 +114,7 @@ TEST_F(Plugin, LiesAreBiasedAndFoundOut) {
   const bool check = has_check();
   for (const char* lie : {"rate", "dropped", "clamp", "roulette"}) {
     write("liar.json", fmt::format(
-                           R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[
+                           R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[
                                {{"name":"liar","rays":"single","samples_per_ray":1000000,"matrix":{{
                                  "estimator":{{"type":"lying","lie":"{}"}},"medium":{{"type":"homogeneous","extinction":1}},
                                  "majorant":{{"type":"global","looseness":2}}}}}}]}})",

@@ -11,7 +11,7 @@ namespace nullmark {
 /// Two estimators in a grey and in a chromatic medium, and a table, for tests of what is done with results.
 inline Plan example_plan() {
   return read_config(
-      R"({"$schema":"nullmark/config/1","name":"example","experiments":[{"name":"e","rays":"single","samples_per_ray":10,
+      R"({"nullmark":"config/2","name":"example","experiments":[{"name":"e","rays":"single","samples_per_ray":10,
     "matrix":{"estimator":["ratio",{"type":"residual_ratio","control":"average"}],
               "medium":["linear",{"type":"layers","values":[1,2,3],"lo":[-1,0,0],"spectrum":[1,2,4]}]}}],
     "tables":[{"title":"T","rows":[{"label":"R","given":{"paper":0.1},"note":"not reproduced",

@@ -19,12 +19,12 @@ namespace {
 std::vector<CellRecord> run_all(std::uint64_t seed, const std::string& gate) {
   std::string cells;
   for (const PlantedScene& scene : kPlantedScenes)
-    cells +=
-        fmt::format(R"({}{{"quantity":"{}","estimator":{},"medium":{},"majorant":{},"rays":{},"samples_per_ray":{},"gate":{}}})",
-                    cells.empty() ? "" : ",", scene.quantity, scene.estimator, scene.medium, scene.majorant, scene.rays,
-                    scene.samples_per_ray, gate);
+    cells += fmt::format(
+        R"({}{{"quantity":"{}","estimator":{},"medium":{},"majorant":{},"rays":{},"samples_per_ray":{},"verdict":{}}})",
+        cells.empty() ? "" : ",", scene.quantity, scene.estimator, scene.medium, scene.majorant, scene.rays,
+        scene.samples_per_ray, gate);
   const Plan plan =
-      read_config(fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"verdict":{{"alpha":1e-4}},
+      read_config(fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"error_rates":{{"alpha":1e-4}},
       "experiments":[{{"name":"planted","include":[{}]}}]}})",
                               cells),
                   "planted.json", seed);
@@ -81,8 +81,8 @@ TEST(Caught, EveryPlantedBugByTheCheckItNames) {
 
 /// At its default the bug shows once in a million samples: so many are drawn.
 TEST(Caught, NanOnceInAMillion) {
-  const Plan plan = read_config(R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[{"name":"nan",
-      "rays":"single","samples_per_ray":30000000,"gate":{"enabled":false},
+  const Plan plan = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"nan",
+      "rays":"single","samples_per_ray":30000000,"verdict":{"enabled":false},
       "matrix":{"estimator":"planted_nan","medium":{"type":"homogeneous","extinction":1}}}]})",
                                 "nan.json");
   const CellRecord record = run_untimed(plan).at(0);

@@ -24,16 +24,17 @@ std::string honest_estimators(int channels = 1) {
     } catch (const ParameterError&) {
       continue;
     }
-    const Claim claim = entry.make()->claim(Quantity::transmittance);
-    if (claim == Claim::exact || claim == Claim::unbiased) list += fmt::format("{}\"{}\"", list.empty() ? "" : ",", entry.name);
+    const Guarantee claim = entry.make()->claim(Quantity::transmittance);
+    if (claim == Guarantee::exact || claim == Guarantee::unbiased)
+      list += fmt::format("{}\"{}\"", list.empty() ? "" : ",", entry.name);
   }
   return list;
 }
 
 std::vector<CellRecord> run(const std::string& experiment, int threads = 0) {
   const std::string text =
-      R"({"$schema":"nullmark/config/1","name":"test","seed":1,"timing":{"enabled":false},"experiments":[{"name":"cells",)" +
-      experiment + "}]}";
+      R"({"nullmark":"config/2","name":"test","seed":1,"timing":{"enabled":false},"experiments":[{"name":"cells",)" + experiment +
+      "}]}";
   const Plan plan = read_config(text, "test.json");
   return run_untimed(plan, {}, threads);
 }

@@ -25,7 +25,7 @@ std::uint64_t counted_walks(const Cell& cell, const Scene& scene, const Kernel& 
   const std::size_t taken = std::min(rays, wanted), per_ray = (wanted + taken - 1) / taken;
   const auto workspace = kernel.workspace();
   const std::uint64_t key = stream_key(cell, *scene.medium);
-  RayContext context;
+  PreparedRay context;
   Recording recording;
   SampleBlock block;
   Counters counters;

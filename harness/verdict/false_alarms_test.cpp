@@ -166,7 +166,7 @@ struct Subject {
   bool constant = false;        ///< every sample is the mean but for its last digits
 };
 
-CellGate gate_of(const Subject& subject, std::uint64_t samples_per_ray, const std::optional<Pilot>& pilot = {}) {
+TestPlan test_plan_of(const Subject& subject, std::uint64_t samples_per_ray, const std::optional<Pilot>& pilot = {}) {
   const std::size_t rays = subject.rays.size();
   Scene scene;
   auto built = std::make_shared<BuiltRays>();
@@ -174,8 +174,8 @@ CellGate gate_of(const Subject& subject, std::uint64_t samples_per_ray, const st
   scene.rays = built;
   Cell cell;
   cell.samples_per_ray = samples_per_ray;
-  cell.gate.epsilon = subject.epsilon;
-  cell.gate.max_samples_per_ray = std::uint64_t{1} << 40;
+  cell.verdict.epsilon = subject.epsilon;
+  cell.verdict.max_samples_per_ray = std::uint64_t{1} << 40;
   CellTheory theory;
   Targets targets;
   for (std::size_t ray = 0; ray < rays; ++ray) {
@@ -189,16 +189,16 @@ CellGate gate_of(const Subject& subject, std::uint64_t samples_per_ray, const st
     theory.ray_lookups.push_back(law.mean());
     theory.ray_lookups_variance.push_back(law.variance());
   }
-  CellGate gate = plan_gate(cell, scene, targets, subject.range, Claim::unbiased, theory, pilot, {});
-  if (subject.lookups) std::erase_if(gate.tests, [](const MeanTest& test) { return test.channel != MeanTest::kLookups; });
-  return gate;
+  TestPlan test_plan = plan_tests(cell, scene, targets, subject.range, Guarantee::unbiased, theory, pilot, {});
+  if (subject.lookups) std::erase_if(test_plan.tests, [](const MeanTest& test) { return test.channel != MeanTest::kLookups; });
+  return test_plan;
 }
 
 /// A cell under judgement.
 class Trial {
  public:
-  Trial(const Subject& subject, const CellGate& gate, PlainRng rng)
-      : subject_(subject), gate_(gate), rng_(rng), evidence_(gate.tests.size()) {}
+  Trial(const Subject& subject, const TestPlan& test_plan, PlainRng rng)
+      : subject_(subject), test_plan_(test_plan), rng_(rng), evidence_(test_plan.tests.size()) {}
 
   /// `count` further samples of every ray.
   void draw(std::uint64_t count) {
@@ -213,9 +213,9 @@ class Trial {
         squares_ += error * error;
         largest = std::max(largest, std::abs(error));
       }
-      for (std::size_t i = 0; i < gate_.tests.size(); ++i) {
-        const MeanTest& test = gate_.tests[i];
-        if (test.group != MeanTest::kAllRays && test.group != gate_.group_of[ray]) continue;
+      for (std::size_t i = 0; i < test_plan_.tests.size(); ++i) {
+        const MeanTest& test = test_plan_.tests[i];
+        if (test.group != MeanTest::kAllRays && test.group != test_plan_.group_of[ray]) continue;
         if (test.deterministic)
           evidence_[i].largest_error = std::max(evidence_[i].largest_error, largest);
         else
@@ -227,13 +227,13 @@ class Trial {
 
   VerdictRecord verdict(std::uint64_t family, Real alpha, Real alpha_pass, bool forget_denominators = false) const {
     VerdictRecord verdict;
-    verdict.against = gate_.against;
+    verdict.against = test_plan_.against;
     verdict.samples_per_ray = samples_;
     verdict.family = verdict.lookups_family = family;
     verdict.alpha = alpha;
     verdict.alpha_pass = alpha_pass;
-    for (std::size_t i = 0; i < gate_.tests.size(); ++i) {
-      MeanTest test = gate_.tests[i];
+    for (std::size_t i = 0; i < test_plan_.tests.size(); ++i) {
+      MeanTest test = test_plan_.tests[i];
       if (forget_denominators)
         for (auto& [role, bet] : test.bets) bet.variance = 0;
       verdict.tests.push_back(test_record(test, evidence_[i]));
@@ -266,7 +266,7 @@ class Trial {
   }
 
   const Subject& subject_;
-  const CellGate& gate_;
+  const TestPlan& test_plan_;
   PlainRng rng_;
   std::vector<Evidence> evidence_;
   std::vector<Real> errors_, sums_;
@@ -368,13 +368,14 @@ TEST(FalseAlarms, SweepsWithoutBiasKeepTheirLevel) {
 
   const std::uint64_t sweeps = 1000 / kThin;
   constexpr Real kLevels[] = {1e-1, 1e-2};
-  std::vector<CellGate> gates;
+  std::vector<TestPlan> test_plans;
   std::uint64_t family = 0;
   for (const auto* list : {&sweep, &lookups})
     for (const Entry& entry : *list) {
       const std::uint64_t rays = entry.subject.rays.size();
-      gates.push_back(gate_of(entry.subject, kFirstLook / rays, entry.pilot ? std::optional<Pilot>({{1}, {}, 0}) : std::nullopt));
-      if (list == &sweep) family += gates.back().tests.size();
+      test_plans.push_back(
+          test_plan_of(entry.subject, kFirstLook / rays, entry.pilot ? std::optional<Pilot>({{1}, {}, 0}) : std::nullopt));
+      if (list == &sweep) family += test_plans.back().tests.size();
     }
   std::printf("%zu cells, %llu tests a sweep, looks at %llu to %llu samples\n", sweep.size(),
               static_cast<unsigned long long>(family), static_cast<unsigned long long>(kFirstLook),
@@ -386,15 +387,15 @@ TEST(FalseAlarms, SweepsWithoutBiasKeepTheirLevel) {
   std::uint64_t single[2] = {}, single_trials = 0;  // alarms of single cells, each judged as if it were alone
   for (std::uint64_t s = 0; s < sweeps; ++s) {
     Alarms seen[2];
-    for (std::size_t i = 0; i < gates.size(); ++i) {
+    for (std::size_t i = 0; i < test_plans.size(); ++i) {
       const bool counts_lookups = i >= sweep.size();
       const Entry& entry = counts_lookups ? lookups[i - sweep.size()] : sweep[i];
-      std::optional<CellGate> piloted;
+      std::optional<TestPlan> piloted;
       if (entry.pilot)
-        piloted = gate_of(entry.subject, kFirstLook, pilot_of(entry.subject.rays[0], stream(s + 1, i + 100'000), kLastLook));
-      const CellGate& gate = piloted ? *piloted : gates[i];
+        piloted = test_plan_of(entry.subject, kFirstLook, pilot_of(entry.subject.rays[0], stream(s + 1, i + 100'000), kLastLook));
+      const TestPlan& test_plan = piloted ? *piloted : test_plans[i];
       const std::uint64_t rays = entry.subject.rays.size();
-      Trial trial(entry.subject, gate, stream(s + 1, i));
+      Trial trial(entry.subject, test_plan, stream(s + 1, i));
       bool failed[2] = {}, failed_alone[2] = {};
       for (std::uint64_t n = kFirstLook; n <= kLastLook; n *= 2) {
         trial.draw((n == kFirstLook ? n : n / 2) / rays);
@@ -402,7 +403,7 @@ TEST(FalseAlarms, SweepsWithoutBiasKeepTheirLevel) {
           const Real alpha = kLevels[level];
           const std::uint64_t of = counts_lookups ? lookups.size() : family;
           failed[level] |= outcome_of(trial.verdict(of, alpha, 1e-3)) == Outcome::fail;
-          failed_alone[level] |= outcome_of(trial.verdict(gate.tests.size(), alpha, 1e-3)) == Outcome::fail;
+          failed_alone[level] |= outcome_of(trial.verdict(test_plan.tests.size(), alpha, 1e-3)) == Outcome::fail;
           if (!counts_lookups && n == kLastLook)
             seen[level].no_denominator += outcome_of(trial.verdict(of, alpha, 1e-3, true)) == Outcome::fail;
         }
@@ -449,10 +450,10 @@ TEST(FalseAlarms, ABiasOfTheMarginHardlyPasses) {
       const Real margin = std::min(0.9, margin_for(named.law, kPlanned));
       subject.epsilon = margin;
       subject.claimed = {named.law.mean() / (1 + side * margin)};
-      const CellGate gate = gate_of(subject, kFirstLook);
+      const TestPlan test_plan = test_plan_of(subject, kFirstLook);
       std::uint64_t passed = 0;
       for (std::uint64_t run = 0; run < runs; ++run) {
-        Trial trial(subject, gate, stream(run + 1, 200'000 + all_runs));
+        Trial trial(subject, test_plan, stream(run + 1, 200'000 + all_runs));
         bool pass = false;
         for (std::uint64_t n = kFirstLook; n <= kLastLook; n *= 2) {
           trial.draw(n == kFirstLook ? n : n / 2);
@@ -493,9 +494,9 @@ TEST(FalseAlarms, PowerAndCost) {
   };
   const auto judged = [&](const Row& row, Real epsilon, Real bias, std::uint64_t runs) {
     Subject single{{row.law}, row.range, epsilon, {row.law.mean() / (1 + bias)}};
-    const CellGate gate = gate_of(single, kFirst);
-    // The same gate, fed with sums of `together` errors as if each were one.
-    const MeanTest& test = gate.tests[0];
+    const TestPlan test_plan = test_plan_of(single, kFirst);
+    // The same test_plan, fed with sums of `together` errors as if each were one.
+    const MeanTest& test = test_plan.tests[0];
     int together = 1;
     Law summed = row.law;
     constexpr std::size_t kMostValues = 500;
@@ -511,9 +512,9 @@ TEST(FalseAlarms, PowerAndCost) {
       PlainRng rng = stream(run + 1, 300'000 + static_cast<std::uint64_t>(1e5 * std::abs(bias)));
       Evidence evidence;
       std::uint64_t samples = 0;
-      for (Outcome outcome = Outcome::inconclusive; outcome == Outcome::inconclusive && samples < 4 * gate.planned;) {
+      for (Outcome outcome = Outcome::inconclusive; outcome == Outcome::inconclusive && samples < 4 * test_plan.planned;) {
         // As the program draws: doubled up to the plan, then a quarter more each time.
-        const std::uint64_t wanted = samples < gate.planned ? std::min(samples, gate.planned - samples) : samples / 4;
+        const std::uint64_t wanted = samples < test_plan.planned ? std::min(samples, test_plan.planned - samples) : samples / 4;
         const std::uint64_t count = samples == 0 ? kFirst : (wanted + 63) / 64 * 64;
         for (std::uint64_t todo = count; todo > 0;) {
           const std::uint64_t now = std::min<std::uint64_t>(todo, 1 << 16);
@@ -535,9 +536,9 @@ TEST(FalseAlarms, PowerAndCost) {
         }
         samples += count;
         VerdictRecord verdict;
-        verdict.against = gate.against;
+        verdict.against = test_plan.against;
         verdict.family = kFamily;
-        verdict.planned = gate.planned;
+        verdict.planned = test_plan.planned;
         verdict.samples_per_ray = samples;
         verdict.tests = {test_record(test, evidence)};
         decide(verdict);
@@ -561,8 +562,8 @@ TEST(FalseAlarms, PowerAndCost) {
     const std::uint64_t runs = row.law.relative_variance() > 20 ? 100 : 400;
     const Result right = judged(row, 1e-2, 0, runs), wrong = judged(row, 1e-2, 1e-2, runs);
     const Result slightly = judged(row, 1e-3, 1e-3, row.runs_of_thousandth);
-    const CellGate gate = gate_of({{row.law}, row.range, 1e-2}, kFirst);
-    std::printf("| %s | %.2g | %.3f, %.2g | %.3f, %.2g | %.3f, %.2g |\n", row.name, static_cast<double>(gate.planned),
+    const TestPlan test_plan = test_plan_of({{row.law}, row.range, 1e-2}, kFirst);
+    std::printf("| %s | %.2g | %.3f, %.2g | %.3f, %.2g | %.3f, %.2g |\n", row.name, static_cast<double>(test_plan.planned),
                 share(right.pass, right.runs), right.samples, share(wrong.fail, wrong.runs), wrong.samples,
                 share(slightly.fail, slightly.runs), slightly.samples);
     // Planned for more than .95.
@@ -581,7 +582,7 @@ TEST(FalseAlarms, TheProgramsOwnCells) {
   for (std::uint64_t i = 1; i <= seeds; ++i) list += fmt::format("{}{}", i == 1 ? "" : ",", fresh_seed() * 1'000'000 + i);
   const auto experiment = [&](const char* name, const char* estimators, const char* media, const char* majorants) {
     return fmt::format(R"({{"name":"{}","rays":"single","samples_per_ray":2048,"own_streams":true,
-        "gate":{{"epsilon":0.1,"max_samples_per_ray":8192}},
+        "verdict":{{"epsilon":0.1,"max_samples_per_ray":8192}},
         "matrix":{{"estimator":[{}],"medium":[{}],"majorant":[{}],"seed":[{}]}},"zip":[["medium","majorant"]]}})",
                        name, estimators, media, majorants, list);
   };
@@ -598,9 +599,8 @@ TEST(FalseAlarms, TheProgramsOwnCells) {
                  R"({"type":"homogeneous","extinction":2},{"type":"cosine","optical_depth":1})",
                  R"({"type":"global","looseness":0.4},{"type":"global","looseness":0.5})");
   const Plan plan = read_config(
-      fmt::format(
-          R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"verdict":{{"alpha":0.1}},"experiments":[{},{}]}})",
-          bounded, unbounded),
+      fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"error_rates":{{"alpha":0.1}},"experiments":[{},{}]}})",
+                  bounded, unbounded),
       "false_alarms.json");
   const std::vector<CellRecord> records = run_untimed(plan);
 

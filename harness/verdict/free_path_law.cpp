@@ -69,7 +69,7 @@ std::vector<LawRecord> free_path_laws(const Cell& cell, const Scene& scene, cons
   const auto samples = static_cast<std::uint64_t>(std::clamp<Real>(budget.lookups / (each * static_cast<Real>(taken)), 100, 2e5));
   const std::uint64_t key = stream_key(cell, *scene.medium);
   const auto workspace = kernel.workspace();
-  RayContext context;
+  PreparedRay context;
   Recording recording;
   SampleBlock block;
   Counters counters;

@@ -19,8 +19,7 @@ namespace {
 
 std::vector<CellRecord> run(const std::string& experiment) {
   const std::string text =
-      R"({"$schema":"nullmark/config/1","name":"test","timing":{"enabled":false},"experiments":[{"name":"cells",)" + experiment +
-      "}]}";
+      R"({"nullmark":"config/2","name":"test","timing":{"enabled":false},"experiments":[{"name":"cells",)" + experiment + "}]}";
   const Plan plan = read_config(text, "test.json");
   return run_untimed(plan);
 }
@@ -37,7 +36,7 @@ constexpr const char* kWavy =
 
 TEST(FreePath, HonestSamplersKeepTheLaw) {
   const auto records = run(fmt::format(
-      R"("quantity":"free_path","rays":"single","samples_per_ray":65536,"gate":{{"epsilon":0.02,"max_samples_per_ray":4000000}},
+      R"("quantity":"free_path","rays":"single","samples_per_ray":65536,"verdict":{{"epsilon":0.02,"max_samples_per_ray":4000000}},
          "matrix":{{"estimator":["delta","analog_decomposition","weighted_decomposition","weighted_delta"],"medium":[{}],
                    "majorant":["global",{{"type":"grid","resolution":4}}]}})",
       kWavy));
@@ -57,7 +56,7 @@ TEST(FreePath, HonestSamplersKeepTheLaw) {
 /// Every bin has its share, and the density within it is wrong; the sampler states no theory.
 TEST(FreePath, TheDistributionIsTestedWithoutATheory) {
   const auto records = run(
-      R"("quantity":"free_path","rays":"single","samples_per_ray":65536,"gate":{"epsilon":0.02,"max_samples_per_ray":4000000},
+      R"("quantity":"free_path","rays":"single","samples_per_ray":65536,"verdict":{"epsilon":0.02,"max_samples_per_ray":4000000},
          "matrix":{"estimator":["planted_bin_shape"],"medium":[{"type":"homogeneous","extinction":1}]})");
   ASSERT_TRUE(records.at(0).verdict) << records[0].reason;
   EXPECT_NE(records[0].verdict->unbiased, Outcome::fail) << records[0].verdict->reason;
@@ -151,7 +150,7 @@ TEST(Radiance, IsJudgedOnlyWhereTheTrackerTakesPart) {
   EXPECT_FALSE(closed.verdict);
   EXPECT_NE(closed.reason.find("takes no part"), std::string::npos) << closed.reason;
   EXPECT_NEAR(*closed.channel[0].mean, std::exp(-0.5), 1e-15);
-  const CellRecord walked = cell(R"({"environment":1,"kernel":"general"})", R"("gate":{"max_samples_per_ray":4000000},)");
+  const CellRecord walked = cell(R"({"environment":1,"kernel":"general"})", R"("verdict":{"max_samples_per_ray":4000000},)");
   ASSERT_TRUE(walked.verdict);
   EXPECT_EQ(walked.verdict->unbiased, Outcome::pass) << walked.verdict->reason;
   EXPECT_EQ(cell("{}", "").status, Status::skipped);

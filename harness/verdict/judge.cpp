@@ -55,13 +55,13 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSam
 }
 
 /// Laws of how the cell's samples and walks behave, where its configuration asks for them; and what of them is not tested.
-std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
+std::vector<LawRecord> laws_of(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,
                                std::span<const KeptSamples> kept, std::vector<std::string>& untested,
                                const std::function<bool()>& stop) {
   std::vector<LawRecord> laws;
-  const LawPolicy policy = prepared.cell->gate.laws;
-  const bool violates = prepared.needs_bound && !prepared.scene->bounding, judged = gate.against == "reference" && !violates;
-  if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !gate.undecidable.empty())))
+  const LawPolicy policy = prepared.cell->verdict.laws;
+  const bool violates = prepared.needs_bound && !prepared.scene->bounding, judged = plan.against == "reference" && !violates;
+  if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !plan.undecidable.empty())))
     laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range, prepared.theory,
                      {.each = lookups_of_a_sample(sampled)}, stop);
   // Bins are coarse; where weights are 1 the distribution itself can be looked at.
@@ -72,12 +72,12 @@ std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gat
          free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop))
       laws.push_back(law);
   }
-  if (judged && !gate.variances.empty()) {
+  if (judged && !plan.variances.empty()) {
     std::vector<Real> logs;
-    for (std::size_t i = 0; i < gate.variances.size(); ++i)
-      logs.push_back(test_record(gate.variances[i], sampled.variances[i]).log_e_fail);
+    for (std::size_t i = 0; i < plan.variances.size(); ++i)
+      logs.push_back(test_record(plan.variances[i], sampled.variances[i]).log_e_fail);
     // Without a bound above, samples not seen could make up for any variance that was stated too large.
-    laws.push_back({std::isfinite(gate.high) ? "variance" : "variance from below", std::round(log_mean_exp(logs) * 1e4) / 1e4,
+    laws.push_back({std::isfinite(plan.high) ? "variance" : "variance from below", std::round(log_mean_exp(logs) * 1e4) / 1e4,
                     sampled.counters.samples, Outcome::none});
   }
   if (const LawRecord law = replay_law(prepared.planned(), *prepared.scene, *prepared.kernel, kept, stop); law.samples > 0)
@@ -87,7 +87,7 @@ std::vector<LawRecord> laws_of(const PreparedCell& prepared, const CellGate& gat
 
 /// Whether the samples' own spread says that their mean is off, by more than ten samples of 1 that they have not shown could make
 /// up for, though nothing could be bet on it; how, in words.  A few samples say nothing.
-std::optional<std::string> far_off(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled) {
+std::optional<std::string> far_off(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled) {
   constexpr Real kStandardErrors = 6, kUnseen = 10;
   constexpr std::uint64_t kFew = 256;
   if (sampled.counters.samples < kFew) return std::nullopt;
@@ -97,11 +97,11 @@ std::optional<std::string> far_off(const PreparedCell& prepared, const CellGate&
     const auto rays = static_cast<Real>(sampled.lookups.size());
     for (std::size_t ray = 0; ray < sampled.lookups.size(); ++ray) {
       const Moments& moments = sampled.moments[ray * outputs + o];
-      error += (moments.mean() - gate.shift[ray * outputs + o]) / rays;
-      expected += (prepared.targets.mean[ray * outputs + o] + gate.shift[ray * outputs + o]) / rays;
+      error += (moments.mean() - plan.shift[ray * outputs + o]) / rays;
+      expected += (prepared.targets.mean[ray * outputs + o] + plan.shift[ray * outputs + o]) / rays;
       squared += moments.variance() / (static_cast<Real>(std::max<std::uint64_t>(1, moments.count)) * rays * rays);
     }
-    for (const MeanTest& test : gate.tests)
+    for (const MeanTest& test : plan.tests)
       if (test.channel == static_cast<int>(o) && test.group == MeanTest::kAllRays)
         rounding = test.rounding + test.reference_error;
     if (std::abs(error) <= kStandardErrors * std::sqrt(squared) + rounding) continue;
@@ -118,29 +118,29 @@ std::optional<std::string> far_off(const PreparedCell& prepared, const CellGate&
 /// Draws on where a verdict is open, as long as the plan and the configuration allow.
 class Judging {
  public:
-  Judging(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled, const GateLevels& levels,
+  Judging(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled, const ErrorRates& levels,
           const Families& families)
-      : prepared_(prepared), gate_(gate), evidence_(sampled.evidence), violations_(sampled.counters.violations) {
-    verdict_.against = gate.against;
-    verdict_.variance_basis = gate.variance_basis;
-    verdict_.tolerate = prepared.cell->gate.tolerate;
+      : prepared_(prepared), plan_(plan), evidence_(sampled.evidence), violations_(sampled.counters.violations) {
+    verdict_.against = plan.against;
+    verdict_.variance_basis = plan.variance_basis;
+    verdict_.tolerate = prepared.cell->verdict.tolerate;
     verdict_.family = families.means;
     verdict_.lookups_family = families.lookups;
     verdict_.laws_family = families.laws;
     verdict_.alpha = levels.alpha;
     verdict_.alpha_pass = levels.alpha_pass;
-    verdict_.planned = gate.planned;
-    verdict_.affordable = gate.affordable;
-    verdict_.planned_undecidable = !gate.undecidable.empty();
+    verdict_.planned = plan.planned;
+    verdict_.affordable = plan.affordable;
+    verdict_.planned_undecidable = !plan.undecidable.empty();
     verdict_.samples_per_ray = prepared.samples_per_ray;
     verdict_.out_of_range = sampled.out_of_range;
-    open_reason_ = gate.undecidable;
-    if (gate.remedies.empty()) return;
-    if (const auto off = far_off(prepared, gate, sampled)) {
+    open_reason_ = plan.undecidable;
+    if (plan.remedies.empty()) return;
+    if (const auto off = far_off(prepared, plan, sampled)) {
       verdict_.planned_undecidable = false;
       open_reason_ = *off + ": " + open_reason_;
     }
-    open_reason_ += "; " + gate.remedies;
+    open_reason_ += "; " + plan.remedies;
   }
 
   void add_laws(std::vector<LawRecord> laws, std::vector<std::string> untested) {
@@ -155,9 +155,9 @@ class Judging {
     verdict_.bound_unproven = prepared_.needs_bound && !prepared_.scene->bounding && !seen;
     verdict_.reason = open_reason_;
     verdict_.tests.clear();
-    for (std::size_t i = 0; i < gate_.tests.size(); ++i) {
-      verdict_.tests.push_back(test_record(gate_.tests[i], evidence_[i]));
-      if (gate_.tests[i].channel == MeanTest::kLookups && verdict_.counted_walks > 0) verdict_.tests.back().basis = "counted";
+    for (std::size_t i = 0; i < plan_.tests.size(); ++i) {
+      verdict_.tests.push_back(test_record(plan_.tests[i], evidence_[i]));
+      if (plan_.tests[i].channel == MeanTest::kLookups && verdict_.counted_walks > 0) verdict_.tests.back().basis = "counted";
     }
     decide(verdict_, prepared_.targets.names);
     return verdict_;
@@ -166,13 +166,13 @@ class Judging {
   /// The samples to draw next of every ray, of a verdict that was just decided; none where it stands.
   SampleSpan next() const {
     const std::uint64_t drawn = verdict_.samples_per_ray;
-    if (!open() || drawn >= gate_.allowance) return {};
+    if (!open() || drawn >= plan_.allowance) return {};
     // As many again until the planned ones are drawn; then steps of a quarter overshoot by an eighth.
-    const std::uint64_t wanted = drawn < gate_.planned ? std::min(drawn, gate_.planned - drawn) : drawn / 4;
+    const std::uint64_t wanted = drawn < plan_.planned ? std::min(drawn, plan_.planned - drawn) : drawn / 4;
     // Whole sums, and whole blocks of walks where there are many.
     constexpr std::uint64_t kRound = 64, kMany = 1024;
-    const std::uint64_t round = drawn >= kMany ? kRound : gate_.longest_sum;
-    const std::uint64_t count = std::clamp<std::uint64_t>(wanted, 1, gate_.allowance - drawn);
+    const std::uint64_t round = drawn >= kMany ? kRound : plan_.longest_sum;
+    const std::uint64_t count = std::clamp<std::uint64_t>(wanted, 1, plan_.allowance - drawn);
     return {.first = drawn, .per_ray = (count + round - 1) / round * round, .only_evidence = true};
   }
 
@@ -187,13 +187,13 @@ class Judging {
  private:
   /// Whether further samples may decide what is open, and are worth it.
   bool open() const {
-    const Outcome mean = gate_.against == "own mean" ? verdict_.own_mean : verdict_.unbiased;
+    const Outcome mean = plan_.against == "own mean" ? verdict_.own_mean : verdict_.unbiased;
     if (mean == Outcome::inconclusive) {
-      const bool decidable = gate_.remedies.empty() && gate_.planned <= gate_.affordable;
-      return decidable || prepared_.cell->gate.all_samples || promising();
+      const bool decidable = plan_.remedies.empty() && plan_.planned <= plan_.affordable;
+      return decidable || prepared_.cell->verdict.all_samples || promising();
     }
     if (mean != Outcome::pass || verdict_.lookups != Outcome::inconclusive) return false;
-    return gate_.tests.back().planned <= gate_.affordable;
+    return plan_.tests.back().planned <= plan_.affordable;
   }
 
   /// A test of the mean has half the evidence that proves a bias.
@@ -205,7 +205,7 @@ class Judging {
   }
 
   const PreparedCell& prepared_;
-  const CellGate& gate_;
+  const TestPlan& plan_;
   VerdictRecord verdict_;
   std::vector<Evidence> evidence_;
   std::uint64_t violations_;
@@ -216,10 +216,10 @@ class Judging {
 
 std::string why_not_judged(const PreparedCell& prepared) {
   const bool predicts_itself = !prepared.theory.ray_variance.empty();
-  if (!prepared.cell->gate.enabled) return "the configuration disables the verdict";
+  if (!prepared.cell->verdict.enabled) return "the configuration disables the verdict";
   if (!prepared.takes_part) return "the estimator takes no part";
-  if (prepared.claim == Claim::biased) return "the estimator claims nothing";
-  if (prepared.claim == Claim::consistent && !(predicts_itself && prepared.targets.names.empty()))
+  if (prepared.claim == Guarantee::biased) return "the estimator claims nothing";
+  if (prepared.claim == Guarantee::consistent && !(predicts_itself && prepared.targets.names.empty()))
     return "the estimator claims to be consistent and predicts no mean to test";
   if (!prepared.targets.known) return "there is no reference";
   if (prepared.cell->measurement != Measurement{}) return "no claim covers samples that are clamped or rounded";
@@ -232,27 +232,27 @@ bool tests_nothing(const PreparedCell& prepared) {
          std::all_of(depth.begin(), depth.end(), [](Real of_ray) { return of_ray == 0; });
 }
 
-std::optional<CellGate> tests_of(const PreparedCell& prepared, const TestLevels& levels, std::vector<KeptSamples>& kept,
-                                   const std::function<bool()>& stop) {
+std::optional<TestPlan> tests_of(const PreparedCell& prepared, const TestLevels& levels, std::vector<KeptSamples>& kept,
+                                 const std::function<bool()>& stop) {
   if (!why_not_judged(prepared).empty()) return std::nullopt;
   const bool spread_missing = !prepared.theory.ray_lookups.empty() && prepared.theory.ray_lookups_variance.empty();
   std::optional<Pilot> pilot;
-  const bool exact = prepared.claim == Claim::exact;
+  const bool exact = prepared.claim == Guarantee::exact;
   if ((prepared.theory.ray_variance.empty() && !exact) || spread_missing) pilot = run_pilot(prepared, kept, stop);
-  return plan_gate(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim, prepared.theory, pilot,
-                   levels);
+  return plan_tests(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim, prepared.theory, pilot,
+                    levels);
 }
 
-std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
-                                   std::span<const KeptSamples> kept, const GateLevels& levels, const Families& families,
+std::optional<VerdictRecord> judge(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,
+                                   std::span<const KeptSamples> kept, const ErrorRates& levels, const Families& families,
                                    Effort& effort, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress) {
-  Judging judging(prepared, gate, sampled, levels, families);
+  Judging judging(prepared, plan, sampled, levels, families);
   std::vector<std::string> untested;
-  std::vector<LawRecord> laws = laws_of(prepared, gate, sampled, kept, untested, stop);
+  std::vector<LawRecord> laws = laws_of(prepared, plan, sampled, kept, untested, stop);
   judging.add_laws(std::move(laws), std::move(untested));
   // A mean to a hundredth would take more samples than the rest of the verdict.
-  if (!gate.lookups.empty() && gate.tests.back().planned > std::max(prepared.samples_per_ray, gate.planned))
+  if (!plan.lookups.empty() && plan.tests.back().planned > std::max(prepared.samples_per_ray, plan.planned))
     judging.count_lookups(
         counted_walks(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, levels.alpha_pass, stop));
   for (;;) {
@@ -260,7 +260,7 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate&
     const SampleSpan span = judging.next();
     if (span.per_ray == 0) return verdict;
     const auto more =
-        sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, span, &gate, stop, progress);
+        sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, span, &plan, stop, progress);
     if (!more) return std::nullopt;
     effort += *more;
     judging.add(*more, span.per_ray);

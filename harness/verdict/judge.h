@@ -45,12 +45,12 @@ bool tests_nothing(const PreparedCell& prepared);
 
 /// The tests of a cell; nothing for cells that claim nothing that could be tested.  Where theory has no variance a pilot is
 /// drawn, and some of its samples are kept.
-std::optional<CellGate> tests_of(const PreparedCell& prepared, const TestLevels& levels, std::vector<KeptSamples>& kept,
-                                   const std::function<bool()>& stop);
+std::optional<TestPlan> tests_of(const PreparedCell& prepared, const TestLevels& levels, std::vector<KeptSamples>& kept,
+                                 const std::function<bool()>& stop);
 
 /// Looks at the evidence of the first samples and draws further ones while the verdict is open.  Nothing where interrupted.
-std::optional<VerdictRecord> judge(const PreparedCell& prepared, const CellGate& gate, const Sampled& sampled,
-                                   std::span<const KeptSamples> kept, const GateLevels& levels, const Families& families,
+std::optional<VerdictRecord> judge(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,
+                                   std::span<const KeptSamples> kept, const ErrorRates& levels, const Families& families,
                                    Effort& effort, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress);
 

@@ -13,7 +13,7 @@ namespace {
 std::vector<CellRecord> run(const std::string& experiment, std::uint64_t seed = 1) {
   return run_untimed(read_config(
       fmt::format(
-          R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e","rays":{{"type":"single",
+          R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e","rays":{{"type":"single",
               "from":[0,0.5,0.5],"to":[1,0.5,0.5]}},{}}}]}})",
           experiment),
       "judging.json", seed));
@@ -34,7 +34,7 @@ TEST(Judging, ToleratingEpsilonIsNeverWrong) {
     for (std::uint64_t seed = 1; seed <= 100; ++seed) {
       const auto records = run(
           fmt::format(
-              R"("samples_per_ray":4096,"gate":{{"epsilon":{},"tolerate":"epsilon","max_samples_per_ray":400000,"laws":"never"}},
+              R"("samples_per_ray":4096,"verdict":{{"epsilon":{},"tolerate":"epsilon","max_samples_per_ray":400000,"laws":"never"}},
                   "matrix":{{"estimator":"{}","medium":{{"type":"homogeneous","extinction":1}},
                              "majorant":{{"type":"global","looseness":50}}}})",
               one.epsilon, one.tracker),
@@ -58,7 +58,7 @@ TEST(Judging, ToleratingEpsilonIsNeverWrong) {
 /// The same bias where none is tolerated: a FAIL once the samples are enough for it, and its size is told.
 TEST(Judging, ToleratingNothingFindsWhatIsBelowEpsilon) {
   const auto records = run(
-      R"("samples_per_ray":1000000,"gate":{"epsilon":0.01},"matrix":{"estimator":"planted_slight",
+      R"("samples_per_ray":1000000,"verdict":{"epsilon":0.01},"matrix":{"estimator":"planted_slight",
          "medium":{"type":"homogeneous","extinction":1},"majorant":{"type":"global","looseness":50}})");
   EXPECT_EQ(verdict_of(records).unbiased, Outcome::fail);
   EXPECT_TRUE(verdict_of(records).biased);
@@ -69,7 +69,7 @@ TEST(Judging, ToleratingNothingFindsWhatIsBelowEpsilon) {
 /// PASS takes the planned samples, also where the margin is proven sooner.
 TEST(Judging, APassTakesThePlannedSamples) {
   const auto records = run(
-      R"("samples_per_ray":1024,"gate":{"max_samples_per_ray":4000000},"matrix":{"estimator":["delta","ratio"],
+      R"("samples_per_ray":1024,"verdict":{"max_samples_per_ray":4000000},"matrix":{"estimator":["delta","ratio"],
          "medium":{"type":"linear","optical_depth":[0.1,1]}})");
   for (const CellRecord& record : records) {
     EXPECT_EQ(record.verdict->unbiased, Outcome::pass) << record.cell.name;
@@ -84,7 +84,7 @@ TEST(Judging, APassTakesThePlannedSamples) {
 
 /// A plan that is affordable is drawn, though not four times over.
 TEST(Judging, WhatIsAffordableIsDrawn) {
-  const std::string cell = R"("samples_per_ray":1024,"gate":{{"max_samples_per_ray":{}}},"matrix":{{"estimator":"delta",
+  const std::string cell = R"("samples_per_ray":1024,"verdict":{{"max_samples_per_ray":{}}},"matrix":{{"estimator":"delta",
       "medium":{{"type":"homogeneous","extinction":1}},"majorant":{{"type":"global","looseness":2}}}})";
   const std::uint64_t planned = verdict_of(run(fmt::format(fmt::runtime(cell), 100'000'000))).planned;
   const auto records = run(fmt::format(fmt::runtime(cell), planned + planned / 4));
@@ -96,7 +96,7 @@ TEST(Judging, WhatIsAffordableIsDrawn) {
 
 /// The allowance is drawn on where half of what proves a bias is there, and where the configuration says so.
 TEST(Judging, AnAllowanceTooSmallIsDrawnForAPromiseOrOnRequest) {
-  const std::string cell = R"("samples_per_ray":2048,"gate":{{"epsilon":1e-4,"max_samples_per_ray":20000{}}},
+  const std::string cell = R"("samples_per_ray":2048,"verdict":{{"epsilon":1e-4,"max_samples_per_ray":20000{}}},
       "matrix":{{"estimator":"{}","medium":{{"type":"homogeneous","extinction":1}},"majorant":{{"type":"global","looseness":2}}}})";
   EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), "", "delta"))).samples_per_ray, 2048u);
   EXPECT_GE(verdict_of(run(fmt::format(fmt::runtime(cell), R"(,"samples":"all")", "delta"))).samples_per_ray, 20000u);
@@ -121,7 +121,7 @@ TEST(Judging, AViolationNeedsNoLookup) {
 /// A given reference with an error does not take the place of a closed form, nor break the law of the variance.
 TEST(Judging, AGivenReferenceKeepsATighterOne) {
   const auto records = run(
-      R"("samples_per_ray":20000,"reference":{"value":0.5,"error":0.6,"source":"a guess"},"gate":{"laws":"always"},
+      R"("samples_per_ray":20000,"reference":{"value":0.5,"error":0.6,"source":"a guess"},"verdict":{"laws":"always"},
          "matrix":{"estimator":"ratio","medium":{"type":"homogeneous","extinction":1.01}})");
   EXPECT_EQ(records.at(0).reference_method, "closed_form");
   EXPECT_NE(verdict_of(records).lawful, Outcome::fail);
@@ -130,14 +130,14 @@ TEST(Judging, AGivenReferenceKeepsATighterOne) {
 /// Coordinates that double tells to fewer digits than epsilon: no verdict, rather than a false one; nearer ones are judged.
 TEST(Judging, FarCoordinatesAreNoBias) {
   for (const auto& [from, to] : {std::pair{"1e15", "1000000000000001"}, {"1e11", "100000000001"}, {"1e7", "10000001"}}) {
-    const auto records = run_untimed(
-        read_config(fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e",
+    const auto records =
+        run_untimed(read_config(fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e",
             "rays":{{"type":"orthographic","axis":"x","width":1,"height":1}},"samples_per_ray":65536,
             "matrix":{{"estimator":["closed_form","regular","delta","ratio","residual_ratio","next_flight_ratio",
                                     "unbiased_ray_marching","p_series_cmf"],
                        "medium":{{"type":"linear","lo":[{},0,0],"hi":[{},1,1],"optical_depth":1}}}}}}]}})",
-                                from, to),
-                    "far.json"));
+                                            from, to),
+                                "far.json"));
     for (const CellRecord& record : records) {
       const bool farthest = std::string(from) == "1e15";
       EXPECT_EQ(record.status, farthest ? Status::skipped : Status::ok) << record.cell.name << record.reason;
@@ -151,7 +151,7 @@ TEST(Judging, FarCoordinatesAreNoBias) {
 /// The extinction is unbounded at y = 0, which the ray does not touch.
 TEST(Judging, APoleElsewhereIsNoBias) {
   const auto records = run(
-      R"("samples_per_ray":200000,"gate":{"epsilon":0.02,"laws":"always"},
+      R"("samples_per_ray":200000,"verdict":{"epsilon":0.02,"laws":"always"},
          "matrix":{"estimator":["ratio","next_flight_ratio"],"medium":{"type":"exponential_cube","axis":"y"},
                    "majorant":{"type":"prescribed","value":2}})");
   for (const CellRecord& record : records) {
@@ -164,7 +164,7 @@ TEST(Judging, APoleElsewhereIsNoBias) {
 /// A stated variance that is too small, or of samples with a range too large, is no variance to rest a proof on.
 TEST(Judging, StatedVariancesAreTested) {
   const std::string cell =
-      R"("samples_per_ray":65536,"gate":{{"epsilon":0.05}},"matrix":{{"estimator":{{"type":"planted_variance",
+      R"("samples_per_ray":65536,"verdict":{{"epsilon":0.05}},"matrix":{{"estimator":{{"type":"planted_variance",
       "factor":{}}},"medium":{{"type":"homogeneous","extinction":1}},"majorant":{{"type":"global","looseness":2}}}})";
   for (const Real factor : {0.23, 4.}) EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), factor))).lawful, Outcome::fail);
   EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), 1.))).lawful, Outcome::pass);
@@ -191,7 +191,7 @@ TEST(Judging, ExactMeansEverySample) {
 TEST(Judging, LookupsAreCountedWhereTheFlightIsTheHarnesss) {
   const auto verdict = [](const std::string& tracker) {
     return verdict_of(run(fmt::format(
-        R"("samples_per_ray":4096,"gate":{{"max_samples_per_ray":4000000}},"matrix":{{"estimator":"{}",
+        R"("samples_per_ray":4096,"verdict":{{"max_samples_per_ray":4000000}},"matrix":{{"estimator":"{}",
            "medium":{{"type":"homogeneous","extinction":0.1}},"majorant":{{"type":"global","looseness":2}}}})",
         tracker)));
   };

@@ -32,7 +32,7 @@ std::vector<std::string> planted() {
 }
 
 std::vector<CellRecord> run(const std::string& samples, const std::string& matrix) {
-  const Plan plan = read_config(fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[
+  const Plan plan = read_config(fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[
       {{"name":"planted","samples_per_ray":{},"matrix":{{{}}}}}]}})",
                                             samples, matrix),
                                 "planted.json");
@@ -149,7 +149,7 @@ TEST(Planted, BatchStreamsRepeatThemselves) {
   spec.field.type = "homogeneous";
   const BuiltMedium medium = build_medium(spec);
   const auto extrema = medium.extrema;
-  RayContext context;
+  PreparedRay context;
   context.world = context.local = Ray{Vec3(0, 0.5, 0.5), Vec3::UnitX(), 0, 1};
   context.segments.segments.push_back({0, 1, 5 * extrema.maximum[0], extrema});
   const auto draw = [&](const char* estimator, std::uint64_t first) {
@@ -171,7 +171,7 @@ TEST(Planted, OnlyTheTestsProgramRunsThem) {
   const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "nullmark_planted";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
-  std::ofstream(folder / "c.json") << R"({"$schema":"nullmark/config/1","timing":{"enabled":false},"experiments":[
+  std::ofstream(folder / "c.json") << R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
       {"name":"e","rays":"single","samples_per_ray":10,"matrix":{"estimator":["planted_zero"],"medium":["linear"]}}]})";
   const auto exit_code = [&](const std::string& program) {
     const int status = std::system(("cd '" + folder.string() + "' && '" + program + "' run c.json >out 2>err").c_str());

@@ -20,7 +20,7 @@ struct Pair {
   const Scene& scene;
   const Kernel& kernel;
   std::unique_ptr<Workspace> told = kernel.workspace(), told_wrong = kernel.workspace();
-  RayContext context{}, wrong{};
+  PreparedRay context{}, wrong{};
   SampleBlock values{}, wrong_values{};
   Counters counters{};
   std::uint64_t key = stream_key(cell, *scene.medium);

@@ -12,8 +12,8 @@ namespace nullmark {
 namespace {
 
 CellRecord run(const std::string& estimator, const std::string& medium, const std::string& rest = "") {
-  const Plan plan = read_config(fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[
-      {{"name":"told","rays":{{"type":"orthographic","axis":"x","width":4,"height":4}},"samples_per_ray":256,"gate":{{"laws":"never"}},{}
+  const Plan plan = read_config(fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[
+      {{"name":"told","rays":{{"type":"orthographic","axis":"x","width":4,"height":4}},"samples_per_ray":256,"verdict":{{"laws":"never"}},{}
         "matrix":{{"estimator":[{}],"medium":[{}],"majorant":[{{"type":"global","looseness":2}}]}}}}]}})",
                                             rest, estimator, medium),
                                 "test.json");

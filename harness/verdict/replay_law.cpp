@@ -25,7 +25,7 @@ LawRecord replay_law(const Cell& cell, const Scene& scene, const Kernel& kernel,
   const std::uint64_t key = stream_key(cell, *scene.medium);
   const auto workspace = kernel.workspace();
   workspace->stop = stop;
-  RayContext context;
+  PreparedRay context;
   SampleBlock block;
   Counters counters;
   for (const KeptSamples& samples : kept) {

@@ -64,8 +64,7 @@ TEST(Replays, KeepsSamplesByTheirAddress) {
 
 std::vector<CellRecord> run(const std::string& experiments) {
   return run_untimed(read_config(
-      fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{}]}})", experiments),
-      "test.json"));
+      fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{}]}})", experiments), "test.json"));
 }
 
 const LawRecord* replay(const CellRecord& record) {
@@ -80,7 +79,7 @@ TEST(Replays, HonestTrackersAreWhatTheyWere) {
   const auto records = run(R"(
       {"name":"lanes","precision":"float","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":1000,
        "matrix":{"estimator":["ratio","delta"],"medium":["cosine"],"majorant":[{"type":"grid","resolution":4}]}},
-      {"name":"double","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":1000,"gate":{"laws":"never"},
+      {"name":"double","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":1000,"verdict":{"laws":"never"},
        "matrix":{"estimator":["ratio","delta","weighted_delta","p_series_cmf","telescoping","regular"],
                  "medium":[{"type":"linear","spectrum":[1,0.5,2]},"layers"],"majorant":["global"]}},
       {"name":"profile","quantity":"transmittance_profile","rays":"single","samples_per_ray":1000,
@@ -114,7 +113,7 @@ TEST(Replays, WhoLearnsFromSamplesIsFoundOutOnOneRay) {
   for (const char* rays : {R"("single")", R"({"type":"orthographic","axis":"x","width":8,"height":8})"})
     for (const int samples : {64, 65536}) {
       SCOPED_TRACE(fmt::format("{}, {} samples", rays, samples));
-      const auto records = run(fmt::format(R"({{"name":"learns","rays":{},"samples_per_ray":{},"gate":{{"laws":"never"}},
+      const auto records = run(fmt::format(R"({{"name":"learns","rays":{},"samples_per_ray":{},"verdict":{{"laws":"never"}},
           "matrix":{{"estimator":["planted_learned_bound"],"medium":[{{"type":"linear","begin":0.5,"end":1.5}}]}}}})",
                                            rays, samples));
       ASSERT_TRUE(replay(records.at(0)));

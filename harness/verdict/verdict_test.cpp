@@ -231,7 +231,7 @@ TEST(Verdict, AnEstimatorThatPredictsItsBiasIsNeverCalledUnbiased) {
 
 VerdictRecord read_back(const VerdictRecord& verdict) {
   const Json json = parse_json(verdict_json(verdict).dump(), "v.json");
-  return read_verdict(Place(json, "v.json"));
+  return read_verdict(JsonNode(json, "v.json"));
 }
 
 TEST(VerdictJson, ComesBackAndIsDecidedTheSame) {
@@ -286,7 +286,7 @@ TEST(VerdictJson, RefusesWhatIsNoVerdict) {
   const Json good = verdict_json(verdict);
   const auto refused = [](const Json& json) {
     try {
-      read_verdict(Place(json, "v.json"));
+      read_verdict(JsonNode(json, "v.json"));
       return std::string();
     } catch (const InputError& error) {
       return std::string(error.what());
@@ -496,15 +496,14 @@ class Check : public ProgramTest {
     ProgramTest::SetUp();
     // All kinds of tests: channels, groups of rays, lookups, cells without variance.
     write("c.json", config(R"("rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":2000,
-        "gate":{"epsilon":0.1,"max_samples_per_ray":16000},
+        "verdict":{"epsilon":0.1,"max_samples_per_ray":16000},
         "matrix":{"estimator":["ratio","delta","next_flight_ratio","regular"],
                   "medium":["linear",{"type":"homogeneous","extinction":0.5,"spectrum":[1,2,4]}],
                   "majorant":[{"type":"global","looseness":1.5}]})"));
   }
 
   static std::string config(const std::string& experiment) {
-    return fmt::format(R"({{"$schema":"nullmark/config/1","timing":{{"enabled":false}},"experiments":[{{"name":"e",{}}}]}})",
-                       experiment);
+    return fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e",{}}}]}})", experiment);
   }
 };
 
@@ -566,7 +565,7 @@ TEST_F(Check, OnlyOpenVerdictsAreNoSuccess) {
   write(
       "o.json",
       config(
-          R"("rays":"single","samples_per_ray":100,"matrix":{"estimator":["delta"],"medium":["linear"]},"gate":{"epsilon":0.001})"));
+          R"("rays":"single","samples_per_ray":100,"matrix":{"estimator":["delta"],"medium":["linear"]},"verdict":{"epsilon":0.001})"));
   ASSERT_EQ(run("run o.json -o r.json"), 0) << read("err");
   EXPECT_EQ(run("check r.json --junit j.xml"), 77) << read("out");
   EXPECT_NE(read("j.xml").find("<skipped message=\"INCONCLUSIVE (as planned, by laws): not decidable at 100 samples a ray; a "
@@ -580,7 +579,7 @@ TEST_F(Check, NothingJudgedIsNoSuccess) {
   write(
       "n.json",
       config(
-          R"("rays":"single","samples_per_ray":100,"matrix":{"estimator":["ratio"],"medium":["linear"]},"gate":{"enabled":false})"));
+          R"("rays":"single","samples_per_ray":100,"matrix":{"estimator":["ratio"],"medium":["linear"]},"verdict":{"enabled":false})"));
   ASSERT_EQ(run("run n.json -o r.json"), 0) << read("err");
   EXPECT_EQ(run("check r.json"), 5) << read("out");
 }

@@ -223,7 +223,7 @@ class LawTester {
   const CellTheory& theory_;
   std::size_t outputs_ = 1;
   std::vector<std::size_t> rays_;
-  RayContext context_;
+  PreparedRay context_;
 
   std::vector<CountLaw> laws_;                            // of the ray at hand, per channel
   std::vector<Real> depths_;                              // majorant depth at which its segments begin
@@ -280,17 +280,17 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
   while (samples < budget.most_per_ray && static_cast<Real>(2 * samples) * each <= budget.lookups) samples *= 2;
   Cell own = cell;
   own.samples_per_ray = samples;
-  own.gate = {};
-  const CellGate gate = plan_gate(own, pieces, targets, range, Claim::unbiased, all[0], std::nullopt, {});
+  own.verdict = {};
+  const TestPlan plan = plan_tests(own, pieces, targets, range, Guarantee::unbiased, all[0], std::nullopt, {});
   const auto sampled =
-      sample_cell(own, pieces, kernel, targets, {.first = first_sample::kLaws, .per_ray = samples, .only_evidence = true}, &gate,
+      sample_cell(own, pieces, kernel, targets, {.first = first_sample::kLaws, .per_ray = samples, .only_evidence = true}, &plan,
                   stop, [](double) {});
   if (!sampled) return std::nullopt;
   std::vector<Real> logs;
-  for (std::size_t i = 0; i < gate.tests.size(); ++i) {
-    if (gate.tests[i].channel == MeanTest::kLookups) continue;
-    const TestRecord record = test_record(gate.tests[i], sampled->evidence[i]);
-    if (gate.tests[i].deterministic)
+  for (std::size_t i = 0; i < plan.tests.size(); ++i) {
+    if (plan.tests[i].channel == MeanTest::kLookups) continue;
+    const TestRecord record = test_record(plan.tests[i], sampled->evidence[i]);
+    if (plan.tests[i].deterministic)
       logs.push_back(record.largest_error > record.rounding + record.reference_error ? kCertain : 0);
     else
       logs.push_back(record.log_e_fail);

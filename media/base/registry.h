@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "media/base/medium.h"
-#include "media/majorants/majorant.h"
 
 namespace nullmark {
 
@@ -65,20 +65,7 @@ struct MediumEntry {
   std::unique_ptr<MediumSource> (*make)() = nullptr;
 };
 
-/// A majorant structure's parameters before it is built over a medium.
-class MajorantSource {
- public:
-  virtual ~MajorantSource() = default;
-  virtual void parameters(ParameterVisitor& visit) = 0;
-  virtual std::unique_ptr<const MajorantStructure> build(std::shared_ptr<const Medium> medium) const = 0;
-};
-
-struct MajorantEntry {
-  std::string name, summary, source;
-  std::unique_ptr<MajorantSource> (*make)() = nullptr;
-};
-
-/// Source is default-constructible, derives from MediumSource or MajorantSource and has the static strings kName, kSummary,
+/// Source is default-constructible, derives from Base and has the static strings kName, kSummary,
 /// kSource.
 template <class Entry, class Base, class Source>
 Entry registry_entry() {
@@ -94,8 +81,3 @@ Entry registry_entry() {
   [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_medium_, __COUNTER__) = \
       ::nullmark::Registry<::nullmark::MediumEntry>::instance().add(                       \
           ::nullmark::registry_entry<::nullmark::MediumEntry, ::nullmark::MediumSource, __VA_ARGS__>())
-
-#define NULLMARK_REGISTER_MAJORANT(...)                                                      \
-  [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_majorant_, __COUNTER__) = \
-      ::nullmark::Registry<::nullmark::MajorantEntry>::instance().add(                       \
-          ::nullmark::registry_entry<::nullmark::MajorantEntry, ::nullmark::MajorantSource, __VA_ARGS__>())

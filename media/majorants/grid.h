@@ -2,8 +2,8 @@
 
 #include <array>
 
-#include "media/base/registry.h"
 #include "media/majorants/crossing.h"
+#include "media/majorants/register_majorant.h"
 
 namespace nullmark {
 

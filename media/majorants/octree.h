@@ -1,6 +1,7 @@
 #pragma once
 
 #include "media/majorants/crossing.h"
+#include "media/majorants/register_majorant.h"
 #include "media/majorants/tree.h"
 
 namespace nullmark {

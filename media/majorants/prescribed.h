@@ -1,7 +1,7 @@
 #pragma once
 
-#include "media/base/registry.h"
 #include "media/majorants/medium_bounds.h"
+#include "media/majorants/register_majorant.h"
 
 namespace nullmark {
 

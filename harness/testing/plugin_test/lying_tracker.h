@@ -26,18 +26,18 @@ struct LyingTracker {
     visit.choice("lie", lie, {"rate", "dropped", "clamp", "roulette"}, "which mistake");
   }
 
-  Claim claim(Quantity) const { return Claim::unbiased; }
+  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct Walk {
     Value weight;
     bool done = false;
   };
 
-  void init(Walk& walk, const Passage<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), false}; }
+  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), false}; }
 
-  bool propose(Walk& walk, const Passage<Value>&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
+  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const { return !walk.done && flight.next(rng); }
 
-  void consume(Walk& walk, const Passage<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     if (lie == "dropped" && std::abs((at.position() - ray.begin) / ray.length() - 0.5) < 0.01) return;
     const Real rate = lie == "rate" ? 1.02 * at.rate() : at.rate();
     walk.weight *= (rate - extinction) / rate;
@@ -47,7 +47,7 @@ struct LyingTracker {
     }
   }
 
-  Value result(const Walk& walk, const Passage<Value>& ray) const {
+  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
     Value weight = walk.weight;
     if (lie == "clamp")
       for (int c = 0; c < ray.channels; ++c) channel(weight, c) = std::max(channel(weight, c), Real{0.1});

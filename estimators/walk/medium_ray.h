@@ -1,0 +1,36 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "estimators/walk/flight.h"
+#include "media/base/value.h"
+#include "media/majorants/majorant.h"
+
+namespace nullmark {
+
+/// One ray's way through the medium, as all walks of a block share it.
+template <class Value>
+struct MediumRay {
+  Real begin = 0, end = 0;  ///< world lengths
+  int channels = 1;
+  Rates majorant;                    ///< one piece per segment, the majorant of the largest channel
+  SegmentBuffer bounds;              ///< extrema per segment
+  Extrema medium;                    ///< over the whole medium
+  std::optional<Value> exact_depth;  ///< tau in closed form or by exact traversal; only for estimators with kNeedsOpticalDepth
+  std::vector<Real> knots;           ///< sorted, begin and end included; only for estimators with kNeedsKnots
+  std::optional<int> degree;         ///< of the extinction between knots
+  Vec3 entry = Vec3::Zero();         ///< world point at `begin`
+  Value albedo;                      ///< mu_s / mu, in [0, 1]; 0 where nothing scatters
+  std::function<Real(Real)>
+      distance_at_depth;         ///< of grey media with closed-form depth; only for estimators with kNeedsInversion
+  Value throughput;              ///< of the path before this flight, 1 where it begins; for trackers that heed the past
+  std::vector<Spectrum> shares;  ///< per segment: bounds of a sum's components over their sum; only with kNeedsShares
+  bool draws_absorption = true;  ///< false: absorption is left to weights (E[w; collision] = mu_s T dt), since nothing emits
+
+  Real length() const { return end - begin; }
+  Value value(Real x) const { return uniform_value<Value>(channels, x); }
+};
+
+}  // namespace nullmark

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "harness/kernel/kernel.h"
+#include "harness/kernel/transport_scene.h"
+
+namespace nullmark {
+
+/// A ray from a point of the scene up to a surface, and the part of it inside the medium, which begins at 0.
+struct Sight {
+  Ray world, local;
+  SurfaceHit hit;
+};
+
+inline Ray moved_to_begin(Ray ray) {
+  ray.origin = ray.at(ray.begin);
+  ray.end -= ray.begin;
+  ray.begin = 0;
+  return ray;
+}
+
+/// Where the medium lies.
+struct MediumFrame {
+  explicit MediumFrame(const Medium& medium) : to_local(medium.world_to_local()), bounds(medium.bounds()) {}
+
+  void look(Ray ray, std::span<const Surface> surfaces, Sight& out) const {
+    const SurfaceHit hit = first_hit(surfaces, ray);
+    ray.end = std::min(ray.end, hit.distance);
+    look(ray, out);
+    out.hit = hit;
+  }
+
+  void look(Ray ray, Sight& out) const {
+    out.hit = {};
+    out.local = clipped(transformed(ray, to_local), bounds);
+    ray.begin = out.local.begin;
+    ray.end = out.local.end;
+    out.world = moved_to_begin(ray);
+    out.local = moved_to_begin(out.local);
+  }
+
+  Affine to_local;
+  Box bounds;
+};
+
+inline Ray camera_ray(const PreparedRay& context) { return {context.world.origin, context.world.direction, 0, kInfinity}; }
+
+inline Spectrum or_black(const Spectrum& radiance, int channels) { return radiance_or_black<Spectrum>(radiance, channels); }
+
+/// Radiance of the surface that was hit, or of the environment.
+Spectrum radiance_behind(const TransportScene& scene, const SurfaceHit& hit);
+
+/// The mean of what arrives along a camera's ray, where it is known; else NaN: see make_path_kernel.
+Spectrum known_radiance(const TransportScene& scene, const Ray& camera);
+
+/// What all kernels of light have in common.
+class RadianceKernel : public Kernel {
+ public:
+  explicit RadianceKernel(const TransportScene& scene)
+      : scene_(scene),
+        frame_(*scene.medium),
+        extrema_(scene.medium->extrema(frame_.bounds)),
+        channels_(scene.medium->channels()) {}
+
+  bool needs_optical_depth() const override { return false; }
+  bool needs_knots() const override { return false; }
+  bool states_theory() const override { return false; }
+  bool answers(Quantity quantity) const override { return quantity == Quantity::radiance; }
+  std::size_t outputs(Quantity, const PreparedRay&) const override { return static_cast<std::size_t>(channels_); }
+  bool flies() const override { return false; }
+  bool states_count_law() const override { return false; }
+  std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const override { return {}; }
+  std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const override {
+    return std::vector<Theory>(static_cast<std::size_t>(channels_));
+  }
+
+ protected:
+  TransportScene scene_;
+  MediumFrame frame_;
+  Extrema extrema_;
+  int channels_;
+};
+
+/// Where light is only absorbed: by constant extinction nothing is drawn; by any medium it is the T of `transmittance` times the
+/// radiance behind.
+std::unique_ptr<const Kernel> make_beer_lambert_kernel(const TransportScene& scene);
+std::unique_ptr<const Kernel> make_absorption_kernel(const TransportScene& scene, std::unique_ptr<const Kernel> transmittance);
+
+}  // namespace nullmark
