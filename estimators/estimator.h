@@ -13,59 +13,75 @@
 
 namespace nullmark {
 
-// An estimator is a class template over Value with its parameters as fields and
+// An estimator is a class template over Value with its parameters as fields.  A ray is RayData: the estimator's own type of that name,
+// or MediumRay<Value>.  harness/kernel/estimator_traits.h refuses a member of these names that has another signature.  Required:
 //
-//   static constexpr kName, kSummary, kSource     config name, one line, paper and equation
+//   static constexpr kName, kSummary, kSource
+//       name in configurations, one line, paper and equation
 //   static constexpr SampleRange kRange
-//   static constexpr bool kNeedsBound             false where any positive rate leaves it unbiased
+//   static constexpr bool kNeedsBound
+//       false where any positive rate leaves it unbiased
 //   Guarantee claim(Quantity) const
-//   struct Walk                                   the state of one sample
+//   struct Walk
+//       the state of one sample
 //   void init(Walk&, const RayData&, Flight&, auto& rng) const
-//   bool propose(Walk&, const RayData&, Flight&, auto& rng) const      true: "look up the extinction at flight.position()"
+//   bool propose(Walk&, const RayData&, Flight&, auto& rng) const
+//       true: "look up the extinction at flight.position()"
 //   void consume(Walk&, const RayData&, const Flight&, const Value& extinction, auto& rng) const
-//   Value result(const Walk&, const RayData&) const   the transmittance estimate
+//   Value result(const Walk&, const RayData&) const
+//       the transmittance estimate
 //
-// and where it has them
+// Optional:
 //
 //   void parameters(ParameterVisitor&)
-//   void check(const Extrema& medium) const                 throws ParameterError: parameters do not fit the medium
-//   SampleRange range() const                               where the range depends on the parameters
-//   Real order(Quantity) const                              of a consistent estimator: |bias| ~ h^order
-//   using RayData = ...; void prepare(RayData&) const               per-ray data of its own, derived from MediumRay<Value>
-//   Value optical_depth(const Walk&, const RayData&) const      answers Quantity::optical_depth as well
+//   void check(const Extrema& medium) const
+//       throws ParameterError: parameters do not fit the medium
+//   SampleRange range() const
+//       where the range depends on the parameters
+//   Real order(Quantity) const
+//       of a consistent estimator: |bias| ~ h^order
+//   struct RayData : MediumRay<Value>; void prepare(RayData&) const
+//       data of its own for each ray
+//   Value optical_depth(const Walk&, const RayData&) const
+//       answers Quantity::optical_depth as well
 //   Event<Value> event(const Walk&, const RayData&, const Flight& at) const
-//                                                           how the flight, which stands where it ended, did so: answers
-//                                                           Quantity::free_path, drives paths
-//   bool samples_events(int channels) const                 false where there is no event for so many channels; default true
+//       how the flight ended, where it stands now: answers Quantity::free_path, drives paths
+//   bool samples_events(int channels) const
+//       false where there is no event for so many channels; default true
 //   Theory weight_theory(const RayData&, const RayProfile&, int channel) const
-//                                                           of the event's weight and the lookups of the flight
+//       of the event's weight and the lookups of the flight
 //   Value transmittance_at(const Walk&, const RayData&, Real distance) const
-//                                                           estimate of T(begin, distance) by a walk that has met no collision
-//                                                           since `distance`: answers Quantity::transmittance_profile
-//   Value expected(const Value& tau, const RayData&) const      a target other than exp(-tau), e.g. a factor of T
-//   bool flies_once(int channels) const                     false where a sample is several flights or collides without a
-//                                                           lookup; default true
-//   int real_collisions(const Walk&, const RayData&) const      tentative collisions that ended a walk; default 0
+//       estimate of T(begin, distance) by a walk that has met no collision since `distance`: answers Quantity::transmittance_profile
+//   Value expected(const Value& tau, const RayData&) const
+//       a target other than exp(-tau), e.g. a factor of T
+//   bool flies_once(int channels) const
+//       false where a sample is several flights or collides without a lookup; default true
+//   int real_collisions(const Walk&, const RayData&) const
+//       tentative collisions that ended a walk; default 0
 //   Theory theory(const RayData&, const RayProfile&, int channel, Quantity) const
 //   CountLaw count_law(const RayData&, const RayProfile&, int channel) const
-//                                                           of a product of independent weights
-//   static constexpr bool kIgnoresMajorant                  lookups are no tentative collisions: not audited
-//   static constexpr bool kHeavySamples                     their fourth moment can be infinite while their variance is not, so
-//                                                           that no number of them shows it
-//   static constexpr bool kHeavyLookups                     their number has no variance at the defaults, so that its mean over
-//                                                           samples does not settle
-//   static constexpr bool kOwnFlights                       draws its flights by a law of its own
-//   static constexpr bool kLanes = true                     walks run side by side in registers, in double and in float: Walk
-//                                                           holds nothing but Value, Distance<Value> and Truth<Value>; init,
-//                                                           propose, consume and result take ray, flight and stream as auto
-//                                                           and decide by select() and flight.next(rng, alive) where walks
-//                                                           may differ (see lane_kernel.h)
+//       of a product of independent weights
+//   bool needs_optical_depth() const
+//       where kNeedsOpticalDepth depends on the parameters
+//   int component(const Walk&) const
+//       with kNeedsShares: the one component i of a sum that is looked up at a collision; `extinction` is then mu_i over its share,
+//       whose mean over the shares is mu
+//   static constexpr bool kIgnoresMajorant
+//       lookups are no tentative collisions: not audited
+//   static constexpr bool kHeavySamples
+//       the fourth moment can be infinite while the variance is not, so that no number of samples shows it
+//   static constexpr bool kHeavyLookups
+//       the number of lookups has no variance at the defaults, so that its mean over samples does not settle
+//   static constexpr bool kOwnFlights
+//       draws its flights by a law of its own
+//   static constexpr bool kLanes = true
+//       walks run side by side in registers, in double and in float: Walk holds nothing but Value, Distance<Value> and Truth<Value>;
+//       init, propose, consume and result take ray, flight and stream as auto and decide by select() and flight.next(rng, alive) where
+//       walks may differ (see lane_kernel.h)
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
-//                                                           asks the harness to fill exact_depth, knots, distance_at_depth,
-//                                                           shares
-//   int component(const Walk&) const                        with kNeedsShares: the one component i of a sum that is looked up at
-//                                                           a collision; `extinction` is then mu_i over its share, whose mean
-//                                                           over the shares is mu
+//       asks the harness to fill exact_depth, knots, distance_at_depth, shares
+//
+// An estimator that is derived from another withdraws an inherited member by a constant of its name: static constexpr bool count_law = false.
 //
 // The loop, the counting, the majorant audit and the random streams are the harness's.
 

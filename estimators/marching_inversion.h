@@ -12,6 +12,7 @@ struct MarchingInversion : RayMarching<Value> {
   static constexpr const char* kName = "marching_inversion";
   static constexpr const char* kSummary = "free paths by inverting the optical depth of a march, linearly in each step";
   static constexpr const char* kSource = "Perlin and Hoffert 1989";
+  static constexpr bool kLanes = false;
 
   using Base = RayMarching<Value>;
   using RayData = typename Base::RayData;

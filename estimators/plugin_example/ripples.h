@@ -56,12 +56,12 @@ struct Ripples {
     return Extrema::grey(peak / 3 * minimum, peak / 3 * std::clamp(average, minimum, maximum), peak / 3 * maximum);
   }
 
-  void knots(const RayData& ray, std::vector<Real>& t) const {
+  void knots(const Ray& ray, std::vector<Real>& t) const {
     for (int axis = 0; axis < 3; ++axis)
       append_planes(ray, axis, lo[axis], hi[axis], 2 * waves[static_cast<std::size_t>(axis)], t);
   }
 
-  std::optional<Real> optical_depth(const RayData& ray) const {
+  std::optional<Real> optical_depth(const Ray& ray) const {
     if (!(ray.length() > 0)) return 0;
     const Vec3 from = ray.at(ray.begin), to = ray.at(ray.end);
     Real sum = 0;

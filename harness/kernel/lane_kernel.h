@@ -291,7 +291,7 @@ using LanesOf = Estimator<Lanes<T, kNativeLanes<T>>>;
 /// Whether all that a walk calls takes lanes.
 template <template <class> class Estimator>
 constexpr bool runs_in_lanes() {
-  if constexpr (requires { Estimator<Real>::kLanes; }) {
+  if constexpr (requires { requires Estimator<Real>::kLanes; }) {
     using E = LanesOf<Estimator, Real>;
     using Along = typename detail::RayDataOf<Estimator<Real>, Real>::type;
     constexpr std::size_t kWidth = kNativeLanes<Real>;

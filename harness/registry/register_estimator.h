@@ -28,6 +28,13 @@ EstimatorEntry estimator_entry() {
   return entry;
 }
 
+/// Whether an estimator with kLanes has what lanes take.
+template <template <class> class Estimator>
+consteval bool has_the_lanes_it_claims() {
+  if constexpr (requires { requires Estimator<Real>::kLanes; }) return runs_in_lanes<Estimator>();
+  return true;
+}
+
 /// `Bug` has kCaughtBy: "mean", "count_law", "replay", "lookups", "variance", "independence", "audit", "nonfinite", "groups",
 /// "position_law", "chi_square", "reliance" (CellRecord::reliance says so) or "open" (an INCONCLUSIVE that was not planned).
 template <template <class> class Bug, class Source = EstimatorTemplate<Bug>>
@@ -43,8 +50,10 @@ EstimatorEntry planted_entry() {
 
 /// One line makes an estimator known to every command and to the contract tests.  In the tree the build writes it from
 /// `nullmark_estimator(header Class)`; a plug-in writes it itself.
-#define NULLMARK_REGISTER_ESTIMATOR(Estimator)                                                \
-  [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_estimator_, __COUNTER__) = \
+#define NULLMARK_REGISTER_ESTIMATOR(Estimator)                                                                      \
+  static_assert(::nullmark::has_the_lanes_it_claims<Estimator>(),                                                   \
+                "a tracker with kLanes takes ray, flight and stream of init, propose, consume and result as auto"); \
+  [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_estimator_, __COUNTER__) =                       \
       ::nullmark::Registry<::nullmark::EstimatorEntry>::instance().add(::nullmark::estimator_entry<Estimator>())
 
 /// The same for a planted bug; `__VA_ARGS__` is its template and, where that is not EstimatorTemplate, its source.

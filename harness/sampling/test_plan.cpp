@@ -340,8 +340,11 @@ class TestPlanner {
       }
       // A variance near rounding is one of the tracker's arithmetic.
       constexpr Real kAboveRounding = 1e4, kTheoryError = 2e-3;
-      if (!std::isfinite(reference) || !(total / static_cast<Real>(rays_) > kAboveRounding * mean.rounding * mean.rounding))
+      if (!(total / static_cast<Real>(rays_) > kAboveRounding * mean.rounding * mean.rounding)) continue;
+      if (!std::isfinite(reference)) {
+        plan_.untested.push_back("variance: the error of the reference has no bound");
         continue;
+      }
       MeanTest test;
       test.channel = mean.channel;
       test.rays = rays_;

@@ -62,8 +62,9 @@ struct TestPlan {
   std::uint64_t planned = 0;                ///< samples per ray, of the most demanding test of the mean
   std::uint64_t affordable = 0;             ///< samples per ray that the configuration allows
   std::uint64_t allowance = 0;              ///< samples per ray that an undecided cell may draw
-  std::string undecidable;  ///< why an unbiased cell may stay undecided; empty where a thousandth of such do at most
-  std::string remedies;     ///< of a cell in which nothing, or one side only, could be bet: what its estimator could state
+  std::string undecidable;            ///< why an unbiased cell may stay undecided; empty where a thousandth of such do at most
+  std::vector<std::string> untested;  ///< laws that would be tested, and why they are not
+  std::string remedies;  ///< of a cell in which nothing, or one side only, could be bet: what its estimator could state
 };
 
 /// Variance per ray and channel from a pilot run, where theory has none.

@@ -248,7 +248,7 @@ std::optional<VerdictRecord> judge(const PreparedCell& prepared, const TestPlan&
                                    Effort& effort, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress) {
   Judging judging(prepared, plan, sampled, levels, families);
-  std::vector<std::string> untested;
+  std::vector<std::string> untested = plan.untested;
   std::vector<LawRecord> laws = laws_of(prepared, plan, sampled, kept, untested, stop);
   judging.add_laws(std::move(laws), std::move(untested));
   // A mean to a hundredth would take more samples than the rest of the verdict.
