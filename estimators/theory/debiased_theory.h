@@ -2,6 +2,7 @@
 
 #include "estimators/theory/ray_profile.h"
 #include "estimators/theory/theory.h"
+#include "media/base/elementary.h"
 
 namespace nullmark {
 

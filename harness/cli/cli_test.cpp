@@ -108,8 +108,13 @@ TEST_F(Cli, InterruptKeepsWhatIsDone) {
   write("long.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
       {"name":"e","rays":{"type":"orthographic"},"samples_per_ray":[1],"matrix":{"estimator":"ratio","medium":["linear"]}},
       {"name":"f","rays":{"type":"orthographic","width":64,"height":64},"samples_per_ray":2000000,"matrix":{"estimator":"ratio","medium":["linear"]}}]})");
+  // Interrupted once the journal holds its head and the first cell.
   const std::string command =
-      "cd '" + folder_.string() + "' && { timeout --preserve-status -s INT 3 '" NULLMARK_PROGRAM "' run long.json >out 2>err; }";
+      "cd '" + folder_.string() +
+      "' && { '" NULLMARK_PROGRAM
+      "' run long.json >out 2>err & }; "
+      "while kill -0 $! && [ \"$(cat long.results.json.journal | wc -l)\" -lt 2 ]; do sleep .05; done 2>/dev/null; "
+      "kill -INT $!; wait $!";
   const int status = std::system(command.c_str());
   EXPECT_EQ(WEXITSTATUS(status), code(ExitCode::interrupted));
   const RunRecord partial = results("long.results.json");

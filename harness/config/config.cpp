@@ -128,12 +128,13 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
     throw InputError(source.file + ": these are results; nullmark check, compare and report read them");
   top.expect_object();
   if (json.contains("$schema") && json["$schema"] == "nullmark/config/1")
-    top["$schema"].fail(
-        fmt::format("found version 1; expected \"{}\": \"{}\", in which \"gate\" is called \"verdict\", and the top level's "
-                    "\"verdict\" \"error_rates\"",
-                    kVersionKey, kConfigVersion));
+    top["$schema"].fail(fmt::format(
+        "version 1 is no longer read; replace this key by \"{}\": \"{}\", rename \"gate\" to \"verdict\", and \"verdict\" "
+        "at the top to \"error_rates\"",
+        kVersionKey, kConfigVersion));
   if (!json.contains(kVersionKey)) top.fail(fmt::format("expected the key \"{}\": \"{}\"", kVersionKey, kConfigVersion));
   if (top[kVersionKey].string() != kConfigVersion) top[kVersionKey].expected(fmt::format("\"{}\"", kConfigVersion));
+  if (json.contains("verdict")) top["verdict"].fail("is called \"error_rates\" since config/2");
   top.expect_keys(
       {"$schema", kVersionKey, "name", "seed", "timing", "error_rates", "experiments", "tables", "claims", "credits"});
 

@@ -316,6 +316,7 @@ bool agree_on(const std::string& axis, const ConfiguredCell& a, const Configured
 }
 
 std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t seed) {
+  if (node.has("gate")) node["gate"].fail("is called \"verdict\" since config/2");
   node.expect_keys(joined(joined(kAxes, kSingle), {"name", "matrix", "zip", "exclude", "include", "constraints"}));
   refuse_two_sample_counts(node);
   ConfiguredCell base;
@@ -336,6 +337,7 @@ std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t 
       if (node.has(key)) node[key].fail("found without \"matrix\", to which it applies");
   if (node.has("include"))
     for (const JsonNode& entry : node["include"].elements()) {
+      if (entry.has("gate")) entry["gate"].fail("is called \"verdict\" since config/2");
       entry.expect_keys(joined(kAxes, kSingle));
       refuse_two_sample_counts(entry);
       cells.push_back(base);

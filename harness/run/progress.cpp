@@ -9,6 +9,7 @@
 #include <cstdlib>
 
 #include "harness/io/results_json.h"
+#include "harness/model/names.h"
 
 namespace nullmark {
 

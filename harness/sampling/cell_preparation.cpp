@@ -9,6 +9,7 @@
 #include "harness/kernel/path_kernel.h"
 #include "harness/model/names.h"
 #include "harness/registry/components.h"
+#include "harness/sampling/build_transport.h"
 #include "harness/sampling/ray_memory.h"
 
 namespace nullmark {

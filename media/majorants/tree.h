@@ -4,6 +4,7 @@
 
 #include "media/base/registry.h"
 #include "media/majorants/bound_lattice.h"
+#include "media/majorants/crossing.h"
 
 namespace nullmark {
 
