@@ -21,7 +21,7 @@ class CellPatterns : public CellReader {
 
   std::vector<std::string> all(const JsonNode& node) const override;
 
-  /// For each cell that `of` finds, the one that fits the pattern `place` and agrees with it on all axes that the pattern does
+  /// For each cell that `of` finds, the one that fits the pattern `node` and agrees with it on all axes that the pattern does
   /// not name (experiments count as one); of several, the one whose estimator differs in no parameter but those named.  Throws
   /// InputError where there is not exactly one.
   std::vector<std::string> counterparts(const JsonNode& of, const JsonNode& node) const override;

@@ -134,7 +134,7 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
         kVersionKey, kConfigVersion));
   if (!json.contains(kVersionKey)) top.fail(fmt::format("expected the key \"{}\": \"{}\"", kVersionKey, kConfigVersion));
   if (top[kVersionKey].string() != kConfigVersion) top[kVersionKey].expected(fmt::format("\"{}\"", kConfigVersion));
-  if (json.contains("verdict")) top["verdict"].fail("is called \"error_rates\" since config/2");
+  refuse_renamed(top, "verdict", "error_rates");
   top.expect_keys(
       {"$schema", kVersionKey, "name", "seed", "timing", "error_rates", "experiments", "tables", "claims", "credits"});
 

@@ -89,7 +89,7 @@ std::vector<Component> each_component(ComponentKind kind, const JsonNode& node) 
   return components;
 }
 
-/// The values of one key, each as a change to a configured.
+/// The values of one key, each as a change to a cell.
 std::vector<Setter> read_axis(const std::string& key, const JsonNode& node) {
   if (key == "estimator")
     return setters(each_component(ComponentKind::estimator, node),
@@ -315,8 +315,12 @@ bool agree_on(const std::string& axis, const ConfiguredCell& a, const Configured
   return a.cell.precision == b.cell.precision;
 }
 
+void refuse_renamed(const JsonNode& node, const char* before, const char* now) {
+  if (node.has(before)) node[before].fail(fmt::format("is called \"{}\" since {}", now, kConfigVersion));
+}
+
 std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t seed) {
-  if (node.has("gate")) node["gate"].fail("is called \"verdict\" since config/2");
+  refuse_renamed(node, "gate", "verdict");
   node.expect_keys(joined(joined(kAxes, kSingle), {"name", "matrix", "zip", "exclude", "include", "constraints"}));
   refuse_two_sample_counts(node);
   ConfiguredCell base;
@@ -337,7 +341,7 @@ std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t 
       if (node.has(key)) node[key].fail("found without \"matrix\", to which it applies");
   if (node.has("include"))
     for (const JsonNode& entry : node["include"].elements()) {
-      if (entry.has("gate")) entry["gate"].fail("is called \"verdict\" since config/2");
+      refuse_renamed(entry, "gate", "verdict");
       entry.expect_keys(joined(kAxes, kSingle));
       refuse_two_sample_counts(entry);
       cells.push_back(base);

@@ -20,7 +20,7 @@ struct ConfiguredCell {
   Cell cell;
 };
 
-/// Whether a pattern, a partial cell, fits a configured.
+/// Whether a pattern, a partial cell, fits a cell.
 using Test = std::function<bool(const ConfiguredCell&)>;
 
 /// Keys by which cells of an experiment differ.
@@ -31,6 +31,9 @@ Test read_pattern(const JsonNode& node, const std::vector<std::string>& also = {
 
 /// Whether two cells agree on an axis.
 bool agree_on(const std::string& axis, const ConfiguredCell& a, const ConfiguredCell& b);
+
+/// Throws InputError where a configuration has a key by the name it had in version 1.
+void refuse_renamed(const JsonNode& node, const char* before, const char* now);
 
 /// The cells of an experiment (format: config.md).  `seed` is that of cells that name none.
 std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t seed);

@@ -19,7 +19,7 @@ class CellReader {
   /// All that fit, in the order of the configuration; of a list of references one after the other.  Throws InputError for none.
   virtual std::vector<std::string> all(const JsonNode& node) const;
 
-  /// For each cell that `of` refers to, the one that `place` pairs with it.  Throws InputError where there is not exactly one.
+  /// For each cell that `of` refers to, the one that `node` pairs with it.  Throws InputError where there is not exactly one.
   virtual std::vector<std::string> counterparts(const JsonNode& of, const JsonNode& node) const;
 
   /// Whether the cell of a name gets a verdict; true where only results know.

@@ -9,14 +9,20 @@ namespace {
 
 using Field = std::optional<Real> ChannelRecord::*;
 
-std::optional<Real> channel_average(const CellRecord& record, Field field) {
+template <class F>
+std::optional<Real> channel_average_of(const CellRecord& record, const F& of_channel) {
   Real sum = 0;
   for (const ChannelRecord& channel : record.channel) {
-    if (!(channel.*field)) return std::nullopt;
-    sum += *(channel.*field);
+    const std::optional<Real> one = of_channel(channel);
+    if (!one) return std::nullopt;
+    sum += *one;
   }
   if (record.channel.empty()) return std::nullopt;
   return sum / static_cast<Real>(record.channel.size());
+}
+
+std::optional<Real> channel_average(const CellRecord& record, Field field) {
+  return channel_average_of(record, [&](const ChannelRecord& channel) { return channel.*field; });
 }
 
 std::optional<Real> channel_root_mean_square(const CellRecord& record, Field field) {
@@ -74,18 +80,6 @@ Maybe if_run(const CellRecord& record, Real value) { return record.status == Sta
 
 Real samples_of(const CellRecord& record) { return static_cast<Real>(record.samples); }
 
-/// Errors of channels on one walk go together: the average's is at most their average.
-template <class F>
-Maybe channel_average_of(const CellRecord& record, const F& of_channel) {
-  Real sum = 0;
-  for (const ChannelRecord& channel : record.channel) {
-    const Maybe one = of_channel(channel);
-    if (!one) return std::nullopt;
-    sum += *one;
-  }
-  return record.channel.empty() ? std::nullopt : Maybe(sum / static_cast<Real>(record.channel.size()));
-}
-
 Maybe error_of_mean(const CellRecord& record, const ChannelRecord& channel) {
   const Maybe variance = channel.variance ? channel.variance : channel.variance_theory;
   return variance ? Maybe(std::sqrt(*variance / samples_of(record))) : std::nullopt;
@@ -101,6 +95,7 @@ Maybe error_of_variance(const CellRecord& record, const ChannelRecord& channel) 
   return product(relative_error_of_variance(record, channel), channel.variance);
 }
 
+/// Errors of channels on one walk go together: the average's is at most their average.
 Maybe mean_error(const CellRecord& record) {
   return channel_average_of(record, [&](const ChannelRecord& channel) { return error_of_mean(record, channel); });
 }
