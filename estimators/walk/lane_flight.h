@@ -52,8 +52,8 @@ struct LanePlace {
   LaneIndex<T, N> piece;
 };
 
-/// Flight for N walks of one ray side by side: the same steps in the same order for every lane.  Without `several` the rates has
-/// one piece, as with one bound for the whole ray, and nothing is asked about others; an estimator that sets out on another
+/// Flight for N walks of one ray side by side: the same steps in the same order for every lane.  Without `several` the rates have
+/// one piece, as with one bound for the whole ray, and nothing is asked about others; an estimator that sets out on other
 /// rates than the ray's does so in its init, which runs with `several`.
 template <class T, std::size_t N, bool several = true>
 class LaneFlight {
