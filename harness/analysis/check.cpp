@@ -66,72 +66,89 @@ std::size_t configured_cells(const RunRecord& run, const std::function<bool(cons
   return cells;
 }
 
+namespace {
+
+/// Decides a cell anew, from its evidence alone, and counts it.
+void count_cell(CellRecord& record, Summary& summary) {
+  if (record.verdict && record.status == Status::ok) {
+    const VerdictRecord before = *record.verdict;
+    decide(*record.verdict, record.outputs);
+    const VerdictRecord& after = *record.verdict;
+    summary.altered += before.unbiased != after.unbiased || before.own_mean != after.own_mean ||
+                       before.lookups != after.lookups || before.lawful != after.lawful;
+  }
+  switch (kind_of(record)) {
+    case Kind::pass:
+      ++summary.pass;
+      summary.own_mean += record.verdict->against == "own mean";
+      break;
+    case Kind::fail:
+      ++summary.fail;
+      break;
+    case Kind::expected_open:
+      ++summary.expected_open;
+      break;
+    case Kind::unexpected_open:
+      ++summary.unexpected_open;
+      break;
+    case Kind::violated:
+      ++summary.violated;
+      break;
+    case Kind::error:
+      ++summary.errors;
+      break;
+    case Kind::not_run:
+      ++summary.not_run;
+      break;
+    case Kind::unclaimed:
+      ++summary.unclaimed;
+  }
+}
+
+/// Whether a published claim was reproduced or refuted: a result without a verdict of its own.
+bool claim_decided(const Summary& summary) {
+  return std::any_of(summary.findings.begin(), summary.findings.end(),
+                     [](const ClaimFinding& one) { return one.outcome != ClaimOutcome::cannot_tell; });
+}
+
+bool has_order(const Summary& summary, Outcome outcome) {
+  return std::any_of(summary.orders.begin(), summary.orders.end(), [&](const OrderFit& fit) { return fit.outcome == outcome; });
+}
+
+ExitCode exit_of(const Summary& summary) {
+  const bool missed = std::any_of(summary.expectations.begin(), summary.expectations.end(),
+                                  [](const Expectation& one) { return one.measured && !one.met; });
+  const bool told = claim_decided(summary);
+  if (summary.fail > 0 || has_order(summary, Outcome::fail) || missed) return ExitCode::bias_proven;
+  if (summary.errors > 0 || summary.altered > 0) return ExitCode::internal_error;
+  if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0 && !told)
+    return ExitCode::nothing_ran;
+  const bool open = summary.never_started > 0 || summary.unexpected_open > 0 || (summary.pass == 0 && !told) ||
+                    !summary.nothing_proven.empty() || !summary.undecided_trackers.empty() ||
+                    (summary.strict && summary.undecided_claims > 0);
+  return open ? ExitCode::inconclusive : summary.exit;
+}
+
+}  // namespace
+
 Summary summarise(RunRecord& run, bool strict) {
   Summary summary;
   summary.strict = strict;
   for (CellRecord& record : run.cells) {
-    if (record.verdict && record.status == Status::ok) {
-      const VerdictRecord before = *record.verdict;
-      decide(*record.verdict, record.outputs);
-      const VerdictRecord& after = *record.verdict;
-      summary.altered += before.unbiased != after.unbiased || before.own_mean != after.own_mean ||
-                         before.lookups != after.lookups || before.lawful != after.lawful;
-    }
-    switch (kind_of(record)) {
-      case Kind::pass:
-        ++summary.pass;
-        summary.own_mean += record.verdict->against == "own mean";
-        break;
-      case Kind::fail:
-        ++summary.fail;
-        break;
-      case Kind::expected_open:
-        ++summary.expected_open;
-        break;
-      case Kind::unexpected_open:
-        ++summary.unexpected_open;
-        break;
-      case Kind::violated:
-        ++summary.violated;
-        break;
-      case Kind::error:
-        ++summary.errors;
-        break;
-      case Kind::not_run:
-        ++summary.not_run;
-        break;
-      case Kind::unclaimed:
-        ++summary.unclaimed;
-    }
+    count_cell(record, summary);
+    summary.never_started += record.status == Status::not_run;
   }
-  for (const CellRecord& record : run.cells) summary.never_started += record.status == Status::not_run;
   summary.configured = configured_cells(run, [](const Json&) { return true; });
   summary.selected = selected_cells(run).value_or(summary.configured);
   if (summary.selected > run.cells.size()) summary.never_started += summary.selected - run.cells.size();
   summary.undecided_claims = undecided_claims(run);
   summary.undecided_trackers = undecided_trackers(run);
   summary.orders = fit_orders(run.cells);
-  const bool order_failed =
-      std::any_of(summary.orders.begin(), summary.orders.end(), [](const OrderFit& fit) { return fit.outcome == Outcome::fail; });
-  const bool order_passed =
-      std::any_of(summary.orders.begin(), summary.orders.end(), [](const OrderFit& fit) { return fit.outcome == Outcome::pass; });
   summary.expectations = expectations(run);
   summary.findings = findings(run);
-  const bool disappointed = std::any_of(summary.expectations.begin(), summary.expectations.end(),
-                                        [](const Expectation& one) { return one.measured && !one.met; });
-  const bool told = std::any_of(summary.findings.begin(), summary.findings.end(),
-                                [](const ClaimFinding& one) { return one.outcome != ClaimOutcome::cannot_tell; });
-  if (summary.pass > 0 && summary.pass == summary.own_mean && !order_passed && !told)
+  if (summary.pass > 0 && summary.pass == summary.own_mean && !has_order(summary, Outcome::pass) && !claim_decided(summary))
     summary.nothing_proven = "no cell proves anything about the quantity itself: only own means passed";
-  if (summary.fail > 0 || order_failed || disappointed)
-    summary.exit = ExitCode::bias_proven;
-  else if (summary.errors > 0 || summary.altered > 0)
-    summary.exit = ExitCode::internal_error;
-  else if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0 && !told)
-    summary.exit = ExitCode::nothing_ran;
-  else if (summary.never_started > 0 || summary.unexpected_open > 0 || (summary.pass == 0 && !told) ||
-           !summary.nothing_proven.empty() || !summary.undecided_trackers.empty() || (strict && summary.undecided_claims > 0))
-    summary.exit = ExitCode::inconclusive;
+  summary.exit = exit_of(summary);
   return summary;
 }
 

@@ -270,6 +270,30 @@ RunOptions options_of(const RunCommand& command, const std::string& output) {
   return options;
 }
 
+/// Tells the journal, the progress line and the provenance of what a run does.
+RunObserver observer_of(Journal* journal, Progress& progress, RunContext& context) {
+  RunObserver observer;
+  observer.cell_done = [&progress, journal](const CellRecord& record, std::size_t done, std::size_t total) {
+    if (journal && (record.status == Status::ok || record.status == Status::error)) journal->append(record);
+    progress.cell_done(record, done, total);
+  };
+  observer.progress = [&progress](const CellRecord& record, double fraction) { progress.cell_progress(record, fraction); };
+  observer.timing = [&progress](double fraction) { progress.timing(fraction); };
+  observer.cell_timed = [journal](const CellRecord& record) {
+    if (journal) journal->append(record);
+  };
+  observer.verdict_share = [&context](double share) { context.verdict_share = share; };
+  observer.statistics_share = [&context](double share) { context.statistics_share = share; };
+  observer.warning = [&progress](const std::string& message) { progress.warning(message); };
+  return observer;
+}
+
+void tell_results(const RunRecord& run, const std::string& output) {
+  fmt::print("{}", results_tables(run));
+  fmt::print(stderr, "results: {}\n", output);
+  if (const auto remark = busy_remark(run)) fmt::print(stderr, "nullmark: warning: {}\n", *remark);
+}
+
 }  // namespace
 
 ExitCode run_command(const RunCommand& command) {
@@ -308,20 +332,7 @@ ExitCode run_command(const RunCommand& command) {
   RunRecord run;
   {
     Progress progress(count - finished.size());
-    RunObserver observer;
-    observer.cell_done = [&](const CellRecord& record, std::size_t done, std::size_t total) {
-      if (journal && (record.status == Status::ok || record.status == Status::error)) journal->append(record);
-      progress.cell_done(record, done, total);
-    };
-    observer.progress = [&](const CellRecord& record, double fraction) { progress.cell_progress(record, fraction); };
-    observer.timing = [&](double fraction) { progress.timing(fraction); };
-    observer.cell_timed = [&](const CellRecord& record) {
-      if (journal) journal->append(record);
-    };
-    observer.verdict_share = [&](double share) { context.verdict_share = share; };
-    observer.statistics_share = [&](double share) { context.statistics_share = share; };
-    observer.warning = [&](const std::string& message) { progress.warning(message); };
-    std::vector<CellRecord> records = run_plan(plan, selected, finished, options, observer);
+    std::vector<CellRecord> records = run_plan(plan, selected, finished, options, observer_of(journal.get(), progress, context));
     for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i)
       if (selected[i] && next < records.size()) earlier[i] = placed(std::move(records[next++]), plan.cells[i]);
   }
@@ -337,9 +348,7 @@ ExitCode run_command(const RunCommand& command) {
   } else {
     write_atomically(output, results_text(run));
     journal->remove();
-    fmt::print("{}", results_tables(run));
-    fmt::print(stderr, "results: {}\n", output);
-    if (const auto remark = busy_remark(run)) fmt::print(stderr, "nullmark: warning: {}\n", *remark);
+    tell_results(run, output);
   }
   return outcome(run.cells);
 }

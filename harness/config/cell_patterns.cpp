@@ -103,8 +103,8 @@ std::vector<std::string> CellPatterns::counterparts(const JsonNode& of, const Js
     for (const std::size_t configured : matching(entry)) {
       std::vector<std::size_t> found;
       for (const std::size_t candidate : candidates) {
-        const auto agree = [&](const std::string& axis) {
-          return node.has(axis.c_str()) || agree_on(axis, cells_[configured], cells_[candidate]);
+        const auto agree = [&](const Axis& axis) {
+          return node.has(axis.name.c_str()) || axis.agree(cells_[configured], cells_[candidate]);
         };
         const bool same = node.has("experiment") || cells_[configured].experiment == cells_[candidate].experiment;
         if (same && std::all_of(axes().begin(), axes().end(), agree)) found.push_back(candidate);

@@ -17,9 +17,9 @@
 #include "harness/config/component_reader.h"
 #include "harness/config/experiment.h"
 #include "harness/io/claims_json.h"
+#include "harness/io/spec_fields.h"
 #include "harness/io/spec_json.h"
 #include "harness/io/tables_json.h"
-#include "harness/model/names.h"
 
 namespace nullmark {
 namespace {
@@ -62,45 +62,9 @@ class PlanBuilder {
 };
 
 bool same_statistics(const ConfiguredCell& a, const ConfiguredCell& b) {
-  const auto agree = [&](const std::string& axis) { return agree_on(axis, a, b); };
+  const auto agree = [&](const Axis& axis) { return axis.agree(a, b); };
   return a.cell.experiment == b.cell.experiment && std::all_of(axes().begin(), axes().end(), agree) &&
          a.cell.own_streams == b.cell.own_streams;
-}
-
-std::vector<std::uint64_t> read_batches(const JsonNode& node) {
-  const auto one = [](const JsonNode& number) { return number.unsigned_integer(1, 1u << 20); };
-  if (!node.json().is_array()) return {one(node)};
-  std::vector<std::uint64_t> batches;
-  for (const JsonNode& element : node.elements()) {
-    batches.push_back(one(element));
-    if (batches.size() > 1 && batches.back() <= batches[batches.size() - 2]) element.expected("more than the number before it");
-  }
-  if (batches.empty()) node.expected("at least one number");
-  return batches;
-}
-
-TimingPlan read_timing(const JsonNode& node) {
-  node.expect_keys({"enabled", "repetitions", "seconds", "samples_per_traversal"});
-  TimingPlan timing;
-  if (node.has("enabled")) timing.enabled = node["enabled"].boolean();
-  if (node.has("repetitions")) timing.repetitions = static_cast<int>(node["repetitions"].integer(1, 10'000));
-  if (node.has("seconds")) timing.seconds = node["seconds"].positive();
-  if (node.has("samples_per_traversal")) timing.samples_per_traversal = read_batches(node["samples_per_traversal"]);
-  return timing;
-}
-
-Real read_level(const JsonNode& node) {
-  const Real value = node.number();
-  if (!(value > 0 && value < 1)) node.expected("a number between 0 and 1");
-  return value;
-}
-
-ErrorRates read_error_rates(const JsonNode& node) {
-  node.expect_keys({"alpha", "alpha_pass"});
-  ErrorRates error_rates;
-  if (node.has("alpha")) error_rates.alpha = read_level(node["alpha"]);
-  if (node.has("alpha_pass")) error_rates.alpha_pass = read_level(node["alpha_pass"]);
-  return error_rates;
 }
 
 bool agree(const TimingPlan& a, const TimingPlan& b) {
@@ -140,8 +104,8 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
 
   plan.file = source.file;
   plan.name = top.has("name") ? top["name"].string() : std::filesystem::path(source.file).stem().string();
-  if (top.has("timing")) plan.timing = read_timing(top["timing"]);
-  if (top.has("error_rates")) plan.error_rates = read_error_rates(top["error_rates"]);
+  if (top.has("timing")) plan.timing = read_closed<TimingPlan>(top["timing"]);
+  if (top.has("error_rates")) plan.error_rates = read_closed<ErrorRates>(top["error_rates"]);
   std::uint64_t own_seed = 1;
   if (top.has("seed")) own_seed = top["seed"].unsigned_integer(0, std::numeric_limits<std::uint64_t>::max());
   std::vector<std::string>& experiments = plan.experiments;
@@ -216,7 +180,7 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
       throw InputError(fmt::format("{}: /timing: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
     if (!(file.error_rates == plan.error_rates))
-      throw InputError(fmt::format("{}: /verdict: differs from that of {}; expected the same, or run the files one by one",
+      throw InputError(fmt::format("{}: /error_rates: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
     for (const ConfiguredCell& configured : file.cells) builder.add(configured);
     plan.credits.insert(file.credits.begin(), file.credits.end());

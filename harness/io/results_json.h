@@ -14,6 +14,9 @@ Json cell_json(const CellRecord& record);
 /// Numbers come back bit for bit.  Throws InputError.
 CellRecord read_cell(const JsonNode& node);
 
+/// JSON Schema of a cell in the results file.
+Json cell_schema();
+
 /// The results file, one cell a line.
 std::string results_text(const RunRecord& run);
 

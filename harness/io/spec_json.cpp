@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "harness/io/claims_json.h"
+#include "harness/io/spec_fields.h"
 #include "harness/io/tables_json.h"
 #include "harness/io/transport_json.h"
 #include "harness/model/hash.h"
@@ -27,7 +28,7 @@ Json deciding_json(const Plan& plan, const Cell& cell) {
                {"majorant", component_json(plan.majorants[cell.majorant])},
                {"rays", component_json(plan.ray_sets[cell.rays])},
                {"quantity", to_string(cell.quantity)},
-               {"measurement", measurement_json(cell.measurement)}};
+               {"measurement", fields_json(cell.measurement)}};
   if (cell.transport != TransportSpec{}) json["transport"] = transport_json(cell.transport);
   if (cell.precision != Precision::float64) json["precision"] = to_string(cell.precision);
   add_samples(json, cell);
@@ -66,39 +67,6 @@ void add_matter(Json& json, const MediumSpec& medium) {
   if (!medium.emission_field.empty()) json["emission"]["field"] = medium_json(medium.emission_field[0]);
 }
 
-Json reference_json(const GivenReference& reference) {
-  return {{"value", reference.value}, {"error", reference.error}, {"source", reference.source}};
-}
-
-Json measurement_json(const Measurement& measurement) {
-  return {{"clamp", measurement.clamp}, {"quantise_bits", measurement.quantise_bits}};
-}
-
-const std::vector<std::string>& law_policies() {
-  static const std::vector<std::string> kNames = {"undecided", "always", "never"};
-  return kNames;
-}
-
-const std::vector<std::string>& tolerances() {
-  static const std::vector<std::string> kNames = {"nothing", "epsilon"};
-  return kNames;
-}
-
-const std::vector<std::string>& sample_policies() {
-  static const std::vector<std::string> kNames = {"planned", "all"};
-  return kNames;
-}
-
-Json verdict_spec_json(const VerdictSpec& spec) {
-  Json json = {{"enabled", spec.enabled}, {"max_samples_per_ray", spec.max_samples_per_ray}};
-  json["laws"] = law_policies()[static_cast<std::size_t>(spec.laws)];
-  if (spec.tolerate != Tolerate::nothing) json["tolerate"] = tolerances()[static_cast<std::size_t>(spec.tolerate)];
-  if (spec.all_samples) json["samples"] = sample_policies()[1];
-  if (spec.epsilon) json["epsilon"] = *spec.epsilon;
-  if (spec.max_lookups_per_ray) json["max_lookups_per_ray"] = *spec.max_lookups_per_ray;
-  return json;
-}
-
 std::string cell_id(const Plan& plan, const Cell& cell) { return hexadecimal(fnv1a(deciding_json(plan, cell).dump())); }
 
 std::string applied_config(const Plan& plan) {
@@ -110,21 +78,13 @@ std::string applied_config(const Plan& plan) {
     if (plan.media[cell.medium].optional) entry["medium"]["optional"] = true;
     entry["images"] = cell.images;
     entry["image_maximum"] = cell.image_maximum;
-    entry["verdict"] = verdict_spec_json(cell.verdict);
-    if (cell.reference) entry["reference"] = reference_json(*cell.reference);
+    entry["verdict"] = fields_json(cell.verdict);
+    if (cell.reference) entry["reference"] = fields_json(*cell.reference);
     experiments.back()["include"].push_back(std::move(entry));
   }
-  const std::vector<std::uint64_t>& batches = plan.timing.samples_per_traversal;
-  Json json = {{kVersionKey, kConfigVersion},
-               {"name", plan.name},
-               {"timing",
-                {{"enabled", plan.timing.enabled},
-                 {"repetitions", plan.timing.repetitions},
-                 {"seconds", plan.timing.seconds},
-                 {"samples_per_traversal", batches.size() == 1 ? Json(batches[0]) : Json(batches)}}},
-               {"error_rates", {{"alpha", plan.error_rates.alpha}, {"alpha_pass", plan.error_rates.alpha_pass}}},
-               {"experiments", std::move(experiments)},
-               {"tables", tables_json(plan.tables)}};
+  Json json = {{kVersionKey, kConfigVersion},           {"name", plan.name},
+               {"timing", fields_json(plan.timing)},    {"error_rates", fields_json(plan.error_rates)},
+               {"experiments", std::move(experiments)}, {"tables", tables_json(plan.tables)}};
   if (!plan.claims.empty()) json["claims"] = claims_json(plan.claims);
   if (!plan.credits.empty()) json["credits"] = plan.credits;
   return json.dump();

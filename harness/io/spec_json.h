@@ -17,13 +17,6 @@ Json component_json(const Component& component);
 Json medium_json(const MediumSpec& medium);
 /// Adds what a medium does to light beside removing it: albedo, anisotropy, emission.
 void add_matter(Json& json, const MediumSpec& medium);
-Json reference_json(const GivenReference& reference);
-Json measurement_json(const Measurement& measurement);
-/// In the order of LawPolicy.
-const std::vector<std::string>& law_policies();
-const std::vector<std::string>& tolerances();
-const std::vector<std::string>& sample_policies();
-Json verdict_spec_json(const VerdictSpec& spec);
 
 /// What decides a cell's statistics, as canonical text, hashed to 16 hexadecimal digits.
 std::string cell_id(const Plan& plan, const Cell& cell);

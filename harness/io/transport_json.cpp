@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "harness/io/fields.h"
 #include "harness/registry/components.h"
 
 namespace nullmark {
@@ -12,49 +13,119 @@ namespace {
 const std::vector<std::string> kShapes = {"plane", "box", "sphere"}, kNextEvent = {"off", "phase", "uniform"},
                                kKernels = {"own", "general"};
 
-std::array<Real, 3> read_point(const JsonNode& node) {
-  if (!node.json().is_array() || node.json().size() != 3) node.expected("a list of 3 numbers");
-  return {node[std::size_t{0}].number(), node[1].number(), node[2].number()};
+/// Three numbers.
+struct PointField {
+  std::array<Real, 3>& value;
+
+  Json json() const { return value; }
+  void read(const JsonNode& node) const {
+    if (!node.json().is_array() || node.json().size() != 3) node.expected("a list of 3 numbers");
+    for (std::size_t axis = 0; axis < 3; ++axis) value[axis] = node[axis].number();
+  }
+  Json schema() const { return {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 3}, {"maxItems", 3}}; }
+};
+
+/// A radiance: one number for all channels, or one each.
+struct RadianceField {
+  std::vector<Real>& value;
+
+  Json json() const { return value; }
+  void read(const JsonNode& node) const { value = read_per_channel(node, kInfinity); }
+  Json schema() const {
+    const Json number = {{"type", "number"}, {"minimum", 0}};
+    return {{"anyOf", {number, {{"type", "array"}, {"items", number}, {"maxItems", kMaxChannels}}}},
+            {"description", "one number for all channels, or one each"}};
+  }
+};
+
+/// A number of scatterings; null: none is the limit.
+struct LimitField {
+  std::optional<int>& value;
+
+  Json json() const { return value ? Json(*value) : Json(nullptr); }
+  void read(const JsonNode& node) const {
+    value.reset();
+    if (!node.json().is_null()) value = static_cast<int>(node.integer(0, 1'000'000));
+  }
+  Json schema() const { return {{"type", {"integer", "null"}}, {"minimum", 0}}; }
+};
+
+/// A number above 0 and at most 1.
+struct ShareField {
+  Real& value;
+
+  Json json() const { return value; }
+  void read(const JsonNode& node) const {
+    value = node.number();
+    if (!(value > 0 && value <= 1)) node.expected("a number in (0, 1]");
+  }
+  Json schema() const { return {{"type", "number"}, {"exclusiveMinimum", 0}, {"maximum", 1}}; }
+};
+
+}  // namespace
+
+template <class Visit>
+void visit_fields(Visit& visit, SurfaceSpec& surface) {
+  visit.required("type", WordField{surface.type, kShapes, "surface"});
+  const bool box = surface.type == "box", sphere = surface.type == "sphere";
+  visit.required(box ? "low" : sphere ? "center" : "point", PointField{surface.point});
+  if (sphere)
+    visit.required("radius", PositiveField{surface.radius});
+  else
+    visit.required(box ? "high" : "normal", PointField{surface.direction});
+  visit.lenient("radiance", RadianceField{surface.radiance});
 }
 
-/// The keys of a shape's two points.
-std::pair<const char*, const char*> point_keys(const std::string& type) {
-  if (type == "box") return {"low", "high"};
-  return type == "sphere" ? std::pair{"center", "radius"} : std::pair{"point", "normal"};
+namespace {
+
+SurfaceSpec surface_of_type(const std::string& type) {
+  SurfaceSpec surface;
+  surface.type = type;
+  return surface;
 }
 
 SurfaceSpec read_surface(const JsonNode& node) {
   node.expect_object();
-  SurfaceSpec surface;
-  surface.type = node["type"].one_of(kShapes, "surface");
-  const auto [first, second] = point_keys(surface.type);
-  node.expect_keys({"type", first, second, "radiance"});
-  surface.point = read_point(node[first]);
-  if (surface.type == "sphere") {
-    surface.radius = node["radius"].number();
-    if (!(surface.radius > 0)) node["radius"].expected("a radius above 0");
-  } else {
-    surface.direction = read_point(node[second]);
-  }
+  const SurfaceSpec surface = read_closed(node, surface_of_type(node["type"].one_of(kShapes, "surface")));
   if (surface.type == "plane" && surface.direction == std::array<Real, 3>{}) node["normal"].expected("a normal that is not 0");
   for (std::size_t axis = 0; axis < 3 && surface.type == "box"; ++axis)
     if (!(surface.point[axis] < surface.direction[axis])) node["high"].expected("a corner above \"low\" along every axis");
-  if (node.has("radiance")) surface.radiance = read_per_channel(node["radiance"], kInfinity);
   return surface;
 }
 
-Json surface_json(const SurfaceSpec& surface) {
-  const auto [first, second] = point_keys(surface.type);
-  Json json = {{"type", surface.type}, {first, surface.point}};
-  if (surface.type == "sphere")
-    json[second] = surface.radius;
-  else
-    json[second] = surface.direction;
-  json["radiance"] = surface.radiance;
-  return json;
-}
+struct SurfacesField {
+  std::vector<SurfaceSpec>& value;
+
+  Json json() const {
+    Json list = Json::array();
+    for (const SurfaceSpec& surface : value) list.push_back(fields_json(surface));
+    return list;
+  }
+  void read(const JsonNode& node) const {
+    for (const JsonNode& surface : node.elements()) value.push_back(read_surface(surface));
+  }
+  Json schema() const {
+    Json shapes = Json::array();
+    for (const std::string& type : kShapes) {
+      shapes.push_back(closed_schema(surface_of_type(type)));
+      shapes.back()["properties"]["type"] = {{"const", type}};
+    }
+    return list_schema({{"anyOf", std::move(shapes)}});
+  }
+};
 
 }  // namespace
+
+template <class Visit>
+void visit_fields(Visit& visit, TransportSpec& transport) {
+  visit.lenient("environment", RadianceField{transport.environment});
+  visit.lenient("surfaces", SurfacesField{transport.surfaces});
+  visit.lenient("next_event", WordField{transport.next_event, kNextEvent, "next_event"});
+  visit.lenient("roulette_from", LimitField{transport.roulette_from});
+  visit.lenient("roulette_floor", ShareField{transport.roulette_floor});
+  visit.lenient("most_scatterings", LimitField{transport.most_scatterings});
+  visit.lenient("kernel", FlagWordField{transport.general, kKernels, "kernel"});
+}
 
 std::vector<Real> read_per_channel(const JsonNode& node, Real most) {
   std::vector<Real> values;
@@ -68,37 +139,9 @@ std::vector<Real> read_per_channel(const JsonNode& node, Real most) {
   return values;
 }
 
-TransportSpec read_transport(const JsonNode& node) {
-  node.expect_keys({"environment", "surfaces", "next_event", "roulette_from", "roulette_floor", "most_scatterings", "kernel"});
-  TransportSpec transport;
-  if (node.has("environment")) transport.environment = read_per_channel(node["environment"], kInfinity);
-  if (node.has("surfaces"))
-    for (const JsonNode& surface : node["surfaces"].elements()) transport.surfaces.push_back(read_surface(surface));
-  if (node.has("next_event")) transport.next_event = node["next_event"].one_of(kNextEvent, "next_event");
-  const auto count = [&](const char* key, std::optional<int>& value) {
-    if (!node.has(key)) return;
-    value.reset();
-    if (!node[key].json().is_null()) value = static_cast<int>(node[key].integer(0, 1'000'000));
-  };
-  count("roulette_from", transport.roulette_from);
-  count("most_scatterings", transport.most_scatterings);
-  if (node.has("roulette_floor")) {
-    transport.roulette_floor = node["roulette_floor"].number();
-    if (!(transport.roulette_floor > 0 && transport.roulette_floor <= 1)) node["roulette_floor"].expected("a number in (0, 1]");
-  }
-  if (node.has("kernel")) transport.general = node["kernel"].one_of(kKernels, "kernel") == "general";
-  return transport;
-}
+TransportSpec read_transport(const JsonNode& node) { return read_closed<TransportSpec>(node); }
 
-Json transport_json(const TransportSpec& transport) {
-  const auto count = [](const std::optional<int>& value) { return value ? Json(*value) : Json(nullptr); };
-  Json surfaces = Json::array();
-  for (const SurfaceSpec& surface : transport.surfaces) surfaces.push_back(surface_json(surface));
-  return {{"environment", transport.environment},       {"surfaces", std::move(surfaces)},
-          {"next_event", transport.next_event},         {"roulette_from", count(transport.roulette_from)},
-          {"roulette_floor", transport.roulette_floor}, {"most_scatterings", count(transport.most_scatterings)},
-          {"kernel", kKernels[transport.general]}};
-}
+Json transport_json(const TransportSpec& transport) { return fields_json(transport); }
 
 std::string transport_label(const TransportSpec& transport) {
   const Json defaults = transport_json({}), own = transport_json(transport);
@@ -117,40 +160,7 @@ std::string transport_label(const TransportSpec& transport) {
 }
 
 Json transport_schema() {
-  const Json radiance = {{"anyOf",
-                          {{{"type", "number"}, {"minimum", 0}},
-                           {{"type", "array"}, {"items", {{"type", "number"}, {"minimum", 0}}}, {"maxItems", kMaxChannels}}}},
-                         {"description", "one number for all channels, or one each"}};
-  const Json point = {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 3}, {"maxItems", 3}};
-  const auto shape = [&](const char* type, Json properties, const std::vector<std::string>& required) {
-    properties["type"] = {{"const", type}};
-    properties["radiance"] = radiance;
-    return Json{{"type", "object"},
-                {"properties", std::move(properties)},
-                {"required", required},
-                {"additionalProperties", false},
-                {"patternProperties", {{"^x-", Json::object()}}}};
-  };
-  const Json count = {{"type", {"integer", "null"}}, {"minimum", 0}};
-  return {{"type", "object"},
-          {"description", "what light meets beside the medium, and how paths are sampled"},
-          {"properties",
-           {{"environment", radiance},
-            {"surfaces",
-             {{"type", "array"},
-              {"items",
-               {{"anyOf",
-                 {shape("plane", {{"point", point}, {"normal", point}}, {"type", "point", "normal"}),
-                  shape("box", {{"low", point}, {"high", point}}, {"type", "low", "high"}),
-                  shape("sphere", {{"center", point}, {"radius", {{"type", "number"}, {"exclusiveMinimum", 0}}}},
-                        {"type", "center", "radius"})}}}}}},
-            {"next_event", {{"enum", kNextEvent}, {"default", "off"}}},
-            {"roulette_from", count},
-            {"roulette_floor", {{"type", "number"}, {"exclusiveMinimum", 0}, {"maximum", 1}, {"default", 0.05}}},
-            {"most_scatterings", count},
-            {"kernel", {{"enum", kKernels}, {"default", "own"}}}}},
-          {"additionalProperties", false},
-          {"patternProperties", {{"^x-", Json::object()}}}};
+  return described(closed_schema<TransportSpec>(), "what light meets beside the medium, and how paths are sampled");
 }
 
 }  // namespace nullmark

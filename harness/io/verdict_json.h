@@ -10,4 +10,7 @@ Json verdict_json(const VerdictRecord& verdict);
 /// Throws InputError.
 VerdictRecord read_verdict(const JsonNode& node);
 
+/// JSON Schema; null where nothing was tested.
+Json verdict_schema();
+
 }  // namespace nullmark

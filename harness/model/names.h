@@ -77,6 +77,18 @@ inline const std::vector<std::string>& outcome_names() {
   return kNames;
 }
 
+/// In the order of LawPolicy.
+inline const std::vector<std::string>& law_policies() {
+  static const std::vector<std::string> kNames = {"undecided", "always", "never"};
+  return kNames;
+}
+
+/// In the order of Tolerate.
+inline const std::vector<std::string>& tolerances() {
+  static const std::vector<std::string> kNames = {"nothing", "epsilon"};
+  return kNames;
+}
+
 inline const char* to_string(Outcome outcome) { return outcome_names()[static_cast<std::size_t>(outcome)].c_str(); }
 
 }  // namespace nullmark

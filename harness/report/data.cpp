@@ -238,6 +238,33 @@ Json run_json(const RunRecord& run, const Summary& summary, const std::string& f
             {"unclaimed", summary.unclaimed}}}};
 }
 
+/// Scenes, what their cells cost, and the pairs of cells on the same random streams.
+void add_comparisons(const std::vector<Comparison>& all, const Places& places, Json& json) {
+  json["scenes"] = Json::array();
+  json["paired"] = Json::array();
+  json["unpaired"] = Json::array();
+  for (std::size_t scene = 0; scene < all.size(); ++scene) {
+    json["scenes"].push_back(scene_json(all[scene], places));
+    for (const RankedCell& ranked : all[scene].cells) {
+      Json& cell = json["cells"][places.at(ranked.record)];
+      cell["scene"] = scene;
+      cell["cost"] = cost_json(ranked);
+      cell["convergence"] = convergence_row(*ranked.record, ranked.cost);
+    }
+    for (const Pairing& pairing : all[scene].pairings)
+      json["paired"].push_back({{"scene", scene},
+                                {"cell", places.at(all[scene].cells[pairing.ranked].record)},
+                                {"against", places.at(all[scene].cells[pairing.against].record)},
+                                {"ratio", interval(pairing.ratio)},
+                                {"unpaired", interval(pairing.unpaired)},
+                                {"samples", pairing.samples},
+                                {"of_the_means", interval(pairing.of_the_means)}});
+    for (const Unpaired& one : all[scene].unpaired)
+      json["unpaired"].push_back(
+          {{"scene", scene}, {"cell", places.at(all[scene].cells[one.ranked].record)}, {"reason", one.reason}});
+  }
+}
+
 }  // namespace
 
 ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::string>& files, const std::string& baseline,
@@ -266,29 +293,7 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
     for (const ClaimFinding& finding : summary.findings) json["claims"].push_back(claim_json(finding, cells, places));
   }
   const std::vector<Comparison> all = comparisons(runs, baseline);
-  json["scenes"] = Json::array();
-  json["paired"] = Json::array();
-  json["unpaired"] = Json::array();
-  for (std::size_t scene = 0; scene < all.size(); ++scene) {
-    json["scenes"].push_back(scene_json(all[scene], places));
-    for (const RankedCell& ranked : all[scene].cells) {
-      Json& cell = json["cells"][places.at(ranked.record)];
-      cell["scene"] = scene;
-      cell["cost"] = cost_json(ranked);
-      cell["convergence"] = convergence_row(*ranked.record, ranked.cost);
-    }
-    for (const Pairing& pairing : all[scene].pairings)
-      json["paired"].push_back({{"scene", scene},
-                                {"cell", places.at(all[scene].cells[pairing.ranked].record)},
-                                {"against", places.at(all[scene].cells[pairing.against].record)},
-                                {"ratio", interval(pairing.ratio)},
-                                {"unpaired", interval(pairing.unpaired)},
-                                {"samples", pairing.samples},
-                                {"of_the_means", interval(pairing.of_the_means)}});
-    for (const Unpaired& one : all[scene].unpaired)
-      json["unpaired"].push_back(
-          {{"scene", scene}, {"cell", places.at(all[scene].cells[one.ranked].record)}, {"reason", one.reason}});
-  }
+  add_comparisons(all, places, json);
   json["title"] = title;
   json["version"] = this_version();
   json["command"] = command;

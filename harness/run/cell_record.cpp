@@ -42,6 +42,66 @@ std::vector<Real> squared_error_blocks(const Sampled& sampled) {
   return mean;
 }
 
+/// Sums over the rays, of one output.  Moments are those of sample - reference.
+struct Sums {
+  Sums(const Sampled& sampled, const Targets& targets, const Measurement& measurement, std::size_t output) {
+    const std::size_t count = sampled.moments.size() / targets.outputs;
+    rays = static_cast<Real>(count);
+    for (std::size_t ray = 0; ray < count; ++ray) {
+      const std::size_t at = ray * targets.outputs + output;
+      const Moments& moments = sampled.moments[at];
+      const Real truth = measured(targets.mean[at], measurement);
+      pooled += moments;
+      bias += moments.mean();
+      squares += moments.mean() * moments.mean();
+      variance += moments.variance();
+      mean += truth + moments.mean();
+      reference += truth;
+      reference_square += truth * truth;
+      reference_error += targets.error[at];
+    }
+  }
+
+  Moments pooled;
+  Real rays = 0, mean = 0, reference = 0, reference_square = 0, reference_error = 0, bias = 0, squares = 0, variance = 0;
+};
+
+ChannelRecord channel_record(const CellRecord& record, const PreparedCell& prepared, const Sums& sums, std::size_t output) {
+  const Real rays = sums.rays;
+  const auto samples = static_cast<Real>(record.cell.samples_per_ray);
+  const auto& theory = prepared.theory;
+  ChannelRecord out;
+  out.mean = finite(sums.mean / rays);
+  if (prepared.targets.known) {
+    out.reference = finite(sums.reference / rays);
+    out.reference_error = finite(sums.reference_error / rays);
+    out.reference_rms = finite(std::sqrt(sums.reference_square / rays));
+    out.bias = finite(sums.bias / rays);
+    out.rmse = finite(std::sqrt(sums.squares / rays));
+  }
+  if (record.cell.samples_per_ray > 1) out.variance = finite(sums.variance / rays);
+  if (output < theory.variance.size() && theory.variance[output]) {
+    out.variance_theory = finite(*theory.variance[output]);
+    out.rmse_theory = finite(std::sqrt(*theory.variance[output] / samples + theory.squared_bias[output].value_or(0)));
+  }
+  if (output < theory.bias.size() && theory.bias[output]) out.bias_theory = finite(*theory.bias[output]);
+  const std::optional<Real>& best = best_variance(out);
+  if (best && sums.reference_square > 0) out.relative_variance = finite(*best * rays / sums.reference_square);
+  const Moments& pooled = sums.pooled;
+  if (pooled.s2 > 0) out.kurtosis = finite(static_cast<Real>(pooled.count) * pooled.s4 / (pooled.s2 * pooled.s2));
+  return out;
+}
+
+void add_convergence(CellRecord& record, const std::vector<GroupErrors::Level>& levels, Real bias, std::size_t output) {
+  const std::vector<std::optional<Real>> none(static_cast<std::size_t>(outputs_of(record)));
+  for (std::size_t level = 0; level < levels.size(); ++level) {
+    if (level >= record.convergence.size()) record.convergence.push_back({std::uint64_t{1} << level, none, none});
+    const Real mean_square = levels[level].sum_of_squares / static_cast<Real>(levels[level].groups);
+    record.convergence[level].rmse[output] = finite(std::sqrt(mean_square));
+    record.convergence[level].variance[output] = finite(std::max<Real>(0, mean_square - bias * bias));
+  }
+}
+
 }  // namespace
 
 CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
@@ -72,10 +132,8 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
 
 void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled) {
   const Cell& cell = *prepared.cell;
-  const auto rays = static_cast<std::size_t>(record.rays);
-  const auto n = static_cast<Real>(rays), samples = static_cast<Real>(record.cell.samples_per_ray);
+  const auto samples = static_cast<Real>(record.cell.samples_per_ray);
   const Targets& targets = prepared.targets;
-  const std::size_t outputs = targets.outputs;
   record.outputs = targets.names;
   record.samples = sampled.counters.samples;
   record.lookups = sampled.counters.lookups;
@@ -99,52 +157,11 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
   }
   record.variance_basis = "sample";
   if (targets.known && targets.names.empty()) record.squared_error_blocks = squared_error_blocks(sampled);
-  for (std::size_t o = 0; o < outputs; ++o) {
-    Moments pooled;
-    Real mean = 0, reference = 0, reference_square = 0, error = 0, bias = 0, squares = 0, variance = 0;
-    for (std::size_t ray = 0; ray < rays; ++ray) {
-      const Moments& moments = sampled.moments[ray * outputs + o];
-      const Real truth = measured(targets.mean[ray * outputs + o], cell.measurement);
-      pooled += moments;
-      bias += moments.mean();
-      squares += moments.mean() * moments.mean();
-      variance += moments.variance();
-      mean += truth + moments.mean();
-      reference += truth;
-      reference_square += truth * truth;
-      error += targets.error[ray * outputs + o];
-    }
-    ChannelRecord out;
-    out.mean = finite(mean / n);
-    if (targets.known) {
-      out.reference = finite(reference / n);
-      out.reference_error = finite(error / n);
-      out.reference_rms = finite(std::sqrt(reference_square / n));
-      out.bias = finite(bias / n);
-      out.rmse = finite(std::sqrt(squares / n));
-    }
-    if (record.cell.samples_per_ray > 1) out.variance = finite(variance / n);
-    if (o < prepared.theory.variance.size() && prepared.theory.variance[o]) {
-      out.variance_theory = finite(*prepared.theory.variance[o]);
-      out.rmse_theory = finite(std::sqrt(*prepared.theory.variance[o] / samples + prepared.theory.squared_bias[o].value_or(0)));
-      record.variance_basis = "analytic";
-    }
-    if (o < prepared.theory.bias.size() && prepared.theory.bias[o]) out.bias_theory = finite(*prepared.theory.bias[o]);
-    const std::optional<Real>& best = best_variance(out);
-    if (best && reference_square > 0) out.relative_variance = finite(*best * n / reference_square);
-    const auto count = static_cast<Real>(pooled.count);
-    if (pooled.s2 > 0) out.kurtosis = finite(count * pooled.s4 / (pooled.s2 * pooled.s2));
-    record.channel.push_back(out);
-
-    const std::vector<GroupErrors::Level>& levels = sampled.groups[o].levels();
-    for (std::size_t level = 0; level < levels.size(); ++level) {
-      if (level >= record.convergence.size())
-        record.convergence.push_back(
-            {std::uint64_t{1} << level, std::vector<std::optional<Real>>(outputs), std::vector<std::optional<Real>>(outputs)});
-      const Real mean_square = levels[level].sum_of_squares / static_cast<Real>(levels[level].groups);
-      record.convergence[level].rmse[o] = finite(std::sqrt(mean_square));
-      record.convergence[level].variance[o] = finite(std::max<Real>(0, mean_square - bias / n * (bias / n)));
-    }
+  for (std::size_t o = 0; o < targets.outputs; ++o) {
+    const Sums sums(sampled, targets, cell.measurement, o);
+    record.channel.push_back(channel_record(record, prepared, sums, o));
+    if (o < prepared.theory.variance.size() && prepared.theory.variance[o]) record.variance_basis = "analytic";
+    add_convergence(record, sampled.groups[o].levels(), sums.bias / sums.rays, o);
   }
 }
 

@@ -27,6 +27,8 @@
 namespace nullmark {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 struct CellOutcome {
   CellRecord record;
   Effort effort;
@@ -104,22 +106,70 @@ void for_each_in_order(std::size_t count, int threads, std::atomic<bool>& failed
   if (error) std::rethrow_exception(error);
 }
 
+/// Samples and judges cells on all threads, and tells of each when it is done.
+std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& cells, int threads, const RunOptions& options,
+                                   const RunObserver& observer, Clock::time_point start, const std::function<bool()>& stop) {
+  const Families families{mean_family(plan), lookups_family(plan), laws_family(plan)};
+  std::vector<CellOutcome> outcomes(cells.size());
+  std::mutex telling;
+  Background teller;
+  std::size_t done = 0;
+  std::atomic<bool> failed = false;
+  const auto given_up = [&] { return stop() || failed || teller.failed(); };
+  RunObserver guarded = observer;
+  guarded.warning = [&](const std::string& message) {
+    const std::lock_guard lock(telling);
+    observer.warning(message);
+  };
+  // Some progress untold is better than samples that wait.
+  guarded.progress = [&](const CellRecord& record, double fraction) {
+    if (const std::unique_lock lock(telling, std::try_to_lock); lock) observer.progress(record, fraction);
+  };
+  for_each_in_order(cells.size(), threads, failed, [&](std::size_t i) {
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    const bool late = options.time_budget && seconds > *options.time_budget;
+    outcomes[i] = run_cell(plan, cells[i], families, late, options, guarded, given_up);
+    teller.add([&, i] {
+      const std::lock_guard lock(telling);
+      observer.cell_done(outcomes[i].record, ++done, cells.size());
+    });
+  });
+  teller.finish();
+  return outcomes;
+}
+
+using Records = std::map<std::size_t, CellRecord>;  // by place in the plan
+
+void time_records(const std::vector<const PreparedCell*>& cells, const TimingPlan& plan, Records& records,
+                  const RunObserver& observer, const std::function<bool()>& stop) {
+  std::vector<TimedCell> timed;
+  timed.reserve(cells.size());
+  for (const PreparedCell* prepared : cells) timed.push_back({prepared->cell, prepared->scene.get(), prepared->kernel.get()});
+  const auto times = time_cells(timed, plan, stop, [&](double fraction) { observer.timing(fraction); });
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    CellRecord& record = records[cells[i]->index];
+    record.time = times[i];
+    if (!times[i]) continue;
+    record.time->majorant_build_seconds = cells[i]->scene->majorant->build_seconds;
+    observer.cell_timed(record);
+  }
+}
+
 }  // namespace
 
 std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
                                  const RunOptions& options, const RunObserver& observer) {
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(std::max(1, threads)));
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   const auto stop = [&] { return options.interrupted && options.interrupted->load() != 0; };
 
-  std::map<std::size_t, CellRecord> records;  // by place in the plan
+  Records records;
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
     for (const CellRecord& record : finished)
       if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = record;
 
   const bool timing = options.timing && plan.timing.enabled;
-  const Families families{mean_family(plan), lookups_family(plan), laws_family(plan)};
   CellPreparer preparer(plan);
   std::vector<PreparedCell> cells =
       prepare_all(preparer, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
@@ -129,34 +179,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     return timing && record != records.end() && record->second.status == Status::ok && !record->second.time;
   });
   if (!stop()) add_theory(cells);
-
-  std::vector<CellOutcome> outcomes(cells.size());
-  {
-    std::mutex telling;
-    Background teller;
-    std::size_t done = 0;
-    std::atomic<bool> failed = false;
-    const auto given_up = [&] { return stop() || failed || teller.failed(); };
-    RunObserver guarded = observer;
-    guarded.warning = [&](const std::string& message) {
-      const std::lock_guard lock(telling);
-      observer.warning(message);
-    };
-    // Some progress untold is better than samples that wait.
-    guarded.progress = [&](const CellRecord& record, double fraction) {
-      if (const std::unique_lock lock(telling, std::try_to_lock); lock) observer.progress(record, fraction);
-    };
-    for_each_in_order(cells.size(), threads, failed, [&](std::size_t i) {
-      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      const bool late = options.time_budget && seconds > *options.time_budget;
-      outcomes[i] = run_cell(plan, cells[i], families, late, options, guarded, given_up);
-      teller.add([&, i] {
-        const std::lock_guard lock(telling);
-        observer.cell_done(outcomes[i].record, ++done, cells.size());
-      });
-    });
-    teller.finish();
-  }
+  std::vector<CellOutcome> outcomes = run_cells(plan, cells, threads, options, observer, start, stop);
 
   std::vector<const PreparedCell*> to_time;
   to_time.reserve(untimed.size() + cells.size());
@@ -167,20 +190,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     if (outcomes[i].record.status == Status::ok) to_time.push_back(&cells[i]);
     records[cells[i].index] = std::move(outcomes[i].record);
   }
-
-  if (timing && !to_time.empty() && !stop()) {
-    std::vector<TimedCell> timed;
-    timed.reserve(to_time.size());
-    for (const PreparedCell* prepared : to_time) timed.push_back({prepared->cell, prepared->scene.get(), prepared->kernel.get()});
-    const auto times = time_cells(timed, plan.timing, stop, [&](double fraction) { observer.timing(fraction); });
-    for (std::size_t i = 0; i < times.size(); ++i) {
-      CellRecord& record = records[to_time[i]->index];
-      record.time = times[i];
-      if (!times[i]) continue;
-      record.time->majorant_build_seconds = to_time[i]->scene->majorant->build_seconds;
-      observer.cell_timed(record);
-    }
-  }
+  if (timing && !to_time.empty() && !stop()) time_records(to_time, plan.timing, records, observer, stop);
   if (effort.working > 0) {
     observer.verdict_share(effort.judging / (effort.working - effort.judging));
     observer.statistics_share(effort.statistics / (effort.working - effort.statistics));

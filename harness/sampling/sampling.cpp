@@ -132,12 +132,203 @@ Real measured(Real value, const Measurement& measurement) {
   return value;
 }
 
+namespace {
+
+using Errors = std::span<Real>;
+
+/// What all chunks of a cell share.
+class ChunkSampler {
+ public:
+  ChunkSampler(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets, const SampleSpan& span,
+               const TestPlan* plan, KeptSamples& kept)
+      : cell_(cell),
+        scene_(scene),
+        kernel_(kernel),
+        targets_(targets),
+        span_(span),
+        plan_(plan),
+        kept_(kept),
+        key_(stream_key(cell, *scene.medium)),
+        as_drawn_(cell.measurement == Measurement{}),
+        varies_(plan && !plan->variances.empty() && !span.only_evidence) {
+    constexpr Real kLargest = std::numeric_limits<Real>::max();
+    const Real slack = cell.precision == Precision::float64 ? kRangeSlack : kSingleRangeSlack;
+    low_ = plan ? std::max(plan->low - slack, -kLargest) : -kLargest;
+    high_ = plan ? std::min(plan->high + slack, kLargest) : kLargest;
+  }
+
+  /// Draws a chunk; in the middle of it where `stop` says so.
+  void sample(const Chunk& chunk, Scratch& mine, ChunkResult& out, const std::function<bool()>& stop) const {
+    const std::size_t rays = chunk.end_ray - chunk.first_ray, outputs = targets_.outputs;
+    out.moments.resize(rays * outputs);
+    out.lookups.resize(rays);
+    out.lookups_squared.resize(rays);
+    out.null_collisions.resize(rays);
+    out.groups.resize(outputs);
+    out.blocks.resize(outputs);
+    out.group_sums.assign(outputs, 0);
+    const auto begun = Clock::now();
+    const std::span<const MeanTest> tests = plan_ ? plan_->tests : std::span<const MeanTest>();
+    EvidenceAccumulator evidences(plan_, tests, outputs, EvidenceAccumulator::Memory::of_this_thread(), out.evidence);
+    EvidenceAccumulator variances(plan_, varies_ ? plan_->variances : std::span<const MeanTest>(), outputs,
+                                  EvidenceAccumulator::Memory::of_variances(), out.variances);
+    for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray)
+      sample_ray(chunk, ray, mine, out, evidences, variances, stop);
+    const auto drawn_at = Clock::now();
+    evidences.finish();
+    variances.finish();
+    const auto judged_at = Clock::now();
+    out.statistics += judged_at - drawn_at;
+    out.judging += judged_at - drawn_at;
+    out.working += judged_at - begun;
+  }
+
+ private:
+  void sample_ray(const Chunk& chunk, std::size_t ray, Scratch& mine, ChunkResult& out, EvidenceAccumulator& evidences,
+                  EvidenceAccumulator& variances, const std::function<bool()>& stop) const {
+    const Medium& medium = *scene_.medium->medium;
+    const std::size_t local = ray - chunk.first_ray, outputs = targets_.outputs;
+    scene_.context(ray, kernel_, mine.context);
+    kernel_.begin_ray(*mine.workspace, medium, scene_.medium->extrema, mine.context);
+    const std::uint64_t lookups_before = out.counters.lookups, null_collisions_before = out.counters.null_collisions;
+    for (std::uint64_t drawn = 0; drawn < chunk.count; drawn += kBatch) {
+      if (drawn > 0 && stop()) return;
+      const std::uint64_t first = span_.first + chunk.first + drawn, batch = std::min(kBatch, chunk.count - drawn);
+      kernel_.sample(*mine.workspace, medium, mine.context, key_, first, batch, cell_.quantity, mine.block, out.counters);
+      const auto drawn_at = Clock::now();
+      if (span_.keep) kept_.keep(ray, first, batch, mine.block.values);
+      take_moments(ray, local, batch, mine, out);
+      const auto counted_at = Clock::now();
+      take_evidence(ray, batch, mine, evidences, variances);
+      const auto judged_at = Clock::now();
+      out.statistics += judged_at - drawn_at;
+      out.judging += judged_at - counted_at;
+    }
+    out.lookups[local] = out.counters.lookups - lookups_before;
+    out.null_collisions[local] = out.counters.null_collisions - null_collisions_before;
+    for (std::size_t o = 0; o < outputs; ++o) {
+      out.group_sums[o] = out.moments[local * outputs + o].s1;
+      out.groups[o].finish_ray();
+    }
+  }
+
+  void take_moments(std::size_t ray, std::size_t local, std::uint64_t batch, Scratch& mine, ChunkResult& out) const {
+    const std::size_t outputs = targets_.outputs;
+    mine.errors.resize(batch * outputs);
+    for (std::size_t o = 0; o < outputs; ++o) {
+      const std::span<const Real> counted =
+          take_errors(mine, o, targets_.mean[ray * outputs + o], errors_of(mine, o, batch), out);
+      if (span_.only_evidence) continue;
+      out.blocks[o].add(ray, counted, out.moments[local * outputs + o]);
+      out.groups[o].add(counted);
+    }
+    if (!span_.only_evidence) out.lookups_squared[local] += sum_of_squares(mine.block.lookups);
+  }
+
+  void take_evidence(std::size_t ray, std::uint64_t batch, Scratch& mine, EvidenceAccumulator& evidences,
+                     EvidenceAccumulator& variances) const {
+    const std::size_t outputs = targets_.outputs;
+    for (std::size_t o = 0; o < outputs && plan_; ++o) {
+      const Errors errors = errors_of(mine, o, batch);
+      if (const Real shift = plan_->shift[ray * outputs + o]; shift != 0)
+        for (Real& error : errors) error -= shift;
+      evidences.add_errors(ray, o, errors);
+      if (!varies_) continue;
+      for (Real& error : errors) error = error * error - plan_->stated_variance[ray * outputs + o];
+      variances.add_errors(ray, o, errors);
+    }
+    evidences.add_lookups(ray, mine.block.lookups);
+  }
+
+  static Errors errors_of(Scratch& mine, std::size_t o, std::uint64_t batch) { return {&mine.errors[o * batch], batch}; }
+
+  /// Fills `errors` of an output, 0 for samples that are not finite, and returns those that count.
+  std::span<const Real> take_errors(Scratch& mine, std::size_t o, Real target, Errors errors, ChunkResult& out) const {
+    const std::size_t outputs = targets_.outputs;
+    const std::vector<Real>& values = mine.block.values;
+    const Real reference = measured(target, cell_.measurement);
+    if (as_drawn_) {
+      const Real* drawn = values.data();
+      if (outputs > 1) {
+        mine.finite.resize(errors.size());
+        for (std::size_t i = 0; i < errors.size(); ++i) mine.finite[i] = values[i * outputs + o];
+        drawn = mine.finite.data();
+      }
+      if (subtract(drawn, reference, low_, high_, errors, out.largest)) return errors;
+    }
+    mine.finite.clear();
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      const Real value = values[i * outputs + o];
+      errors[i] = 0;
+      if (!std::isfinite(value)) {
+        ++out.nonfinite;
+        continue;
+      }
+      out.out_of_range += !(value >= low_ && value <= high_);
+      out.largest = std::max(out.largest, std::abs(value));
+      errors[i] = measured(value, cell_.measurement) - reference;
+      mine.finite.push_back(errors[i]);
+    }
+    return mine.finite;
+  }
+
+  const Cell& cell_;
+  const Scene& scene_;
+  const Kernel& kernel_;
+  const Targets& targets_;
+  const SampleSpan& span_;
+  const TestPlan* plan_;
+  KeptSamples& kept_;
+  std::uint64_t key_;
+  bool as_drawn_, varies_;
+  Real low_, high_;  ///< the range that the estimator declares, with slack
+};
+
+/// Adds the rays of a chunk, and what does not depend on rays.
+void add_chunk(const Chunk& chunk, const ChunkResult& part, std::size_t outputs, Sampled& result) {
+  const auto seconds = [](Clock::duration time) { return std::chrono::duration<double>(time).count(); };
+  for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
+    const std::size_t local = ray - chunk.first_ray;
+    for (std::size_t o = 0; o < outputs; ++o) result.moments[ray * outputs + o] += part.moments[local * outputs + o];
+    result.lookups[ray] += part.lookups[local];
+    result.null_collisions[ray] += part.null_collisions[local];
+    result.lookups_squared[ray] += part.lookups_squared[local];
+  }
+  for (std::size_t o = 0; o < outputs; ++o) {
+    result.groups[o] += part.groups[o];
+    result.blocks[o] += part.blocks[o];
+  }
+  result.counters += part.counters;
+  result.nonfinite += part.nonfinite;
+  result.out_of_range += part.out_of_range;
+  result.largest = std::max(result.largest, part.largest);
+  result.statistics_seconds += seconds(part.statistics);
+  result.judging_seconds += seconds(part.judging);
+  result.working_seconds += seconds(part.working);
+  for (const auto& [test, evidence] : part.evidence) result.evidence[test] += evidence;
+  for (const auto& [test, evidence] : part.variances) result.variances[test] += evidence;
+}
+
+/// Groups of samples that are larger than a chunk, within one ray: from level `level` on.
+void add_groups_across(const std::vector<Chunk>& chunks, const std::vector<ChunkResult>& parts, int level, Sampled& result) {
+  const std::uint64_t whole_chunk = std::uint64_t{1} << level;
+  std::vector<GroupErrors> across(result.groups.size());
+  for (std::size_t at = 0; at < chunks.size(); ++at)
+    for (std::size_t o = 0; o < across.size(); ++o) {
+      if (chunks[at].first == 0) across[o].finish_ray();
+      if (chunks[at].count == whole_chunk) across[o].carry(static_cast<std::size_t>(level), parts[at].group_sums[o]);
+    }
+  // A chunk's own groups already hold the level at which the chunks begin.
+  for (std::size_t o = 0; o < across.size(); ++o) result.groups[o].append_above(static_cast<std::size_t>(level), across[o]);
+}
+
+}  // namespace
+
 std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
                                    SampleSpan span, const TestPlan* plan, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress) {
   const std::size_t rays = scene.rays->local.size();
   const std::size_t outputs = targets.outputs;
-  const std::uint64_t key = stream_key(cell, *scene.medium);
   const int level = chunk_level(rays, span.per_ray);
   const std::uint64_t whole_chunk = std::uint64_t{1} << level;
   const std::vector<Chunk> chunks = cut(rays, span.per_ray, whole_chunk);
@@ -149,165 +340,33 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   result.blocks.resize(outputs);
   result.lookups_squared.resize(rays);
   result.groups.resize(outputs);
-
   if (plan) result.evidence.resize(plan->tests.size());
   if (plan) result.variances.resize(plan->variances.size());
   if (span.keep) result.kept = KeptSamples(rays, span.first, span.per_ray, outputs);
 
-  std::vector<ChunkResult> results(chunks.size());
+  std::vector<ChunkResult> parts(chunks.size());
   std::atomic<bool> stopped = false;
+  const std::function<bool()> stops = [&] {
+    if (!stopped && stop()) stopped = true;
+    return stopped.load();
+  };
   tbb::enumerable_thread_specific<Scratch> scratch([&] {
     Scratch fresh;
     fresh.workspace = kernel.workspace();
-    fresh.workspace->stop = [&] {
-      if (stop()) stopped = true;
-      return stopped.load();
-    };
+    fresh.workspace->stop = stops;
     return fresh;
   });
-  // Fills `errors` of an output, 0 for samples that are not finite, and tells those that count.
-  constexpr Real kLargest = std::numeric_limits<Real>::max();
-  const Real slack = cell.precision == Precision::float64 ? kRangeSlack : kSingleRangeSlack;
-  const Real low = plan ? std::max(plan->low - slack, -kLargest) : -kLargest;
-  const Real high = plan ? std::min(plan->high + slack, kLargest) : kLargest;
-  const bool as_drawn = cell.measurement == Measurement{};
-  const auto take_errors = [&](Scratch& mine, std::size_t o, Real target, std::span<Real> errors,
-                               ChunkResult& out) -> std::span<const Real> {
-    const std::vector<Real>& values = mine.block.values;
-    const Real reference = measured(target, cell.measurement);
-    if (as_drawn) {
-      const Real* drawn = values.data();
-      if (outputs > 1) {
-        mine.finite.resize(errors.size());
-        for (std::size_t i = 0; i < errors.size(); ++i) mine.finite[i] = values[i * outputs + o];
-        drawn = mine.finite.data();
-      }
-      if (subtract(drawn, reference, low, high, errors, out.largest)) return errors;
-    }
-    mine.finite.clear();
-    for (std::size_t i = 0; i < errors.size(); ++i) {
-      const Real value = values[i * outputs + o];
-      errors[i] = 0;
-      if (!std::isfinite(value)) {
-        ++out.nonfinite;
-        continue;
-      }
-      out.out_of_range += !(value >= low && value <= high);
-      out.largest = std::max(out.largest, std::abs(value));
-      errors[i] = measured(value, cell.measurement) - reference;
-      mine.finite.push_back(errors[i]);
-    }
-    return mine.finite;
-  };
+  const ChunkSampler sampler(cell, scene, kernel, targets, span, plan, result.kept);
   std::atomic<std::size_t> done = 0;
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t at) {
-    if (stopped || stop()) {
-      stopped = true;
-      return;
-    }
-    const Chunk& chunk = chunks[at];
-    ChunkResult& out = results[at];
-    Scratch& mine = scratch.local();
-    out.moments.resize((chunk.end_ray - chunk.first_ray) * outputs);
-    out.lookups.resize(chunk.end_ray - chunk.first_ray);
-    out.lookups_squared.resize(chunk.end_ray - chunk.first_ray);
-    out.null_collisions.resize(chunk.end_ray - chunk.first_ray);
-    out.groups.resize(outputs);
-    out.blocks.resize(outputs);
-    out.group_sums.assign(outputs, 0);
-    const auto begun = Clock::now();
-    const bool varies = plan && !plan->variances.empty() && !span.only_evidence;
-    const std::span<const MeanTest> tests = plan ? plan->tests : std::span<const MeanTest>();
-    EvidenceAccumulator evidences(plan, tests, outputs, EvidenceAccumulator::Memory::of_this_thread(), out.evidence);
-    EvidenceAccumulator variances(plan, varies ? plan->variances : std::span<const MeanTest>(), outputs,
-                                  EvidenceAccumulator::Memory::of_variances(), out.variances);
-    for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
-      scene.context(ray, kernel, mine.context);
-      kernel.begin_ray(*mine.workspace, *scene.medium->medium, scene.medium->extrema, mine.context);
-      const std::uint64_t lookups_before = out.counters.lookups, null_collisions_before = out.counters.null_collisions;
-      const std::size_t local = ray - chunk.first_ray;
-      for (std::uint64_t drawn = 0; drawn < chunk.count && !stopped; drawn += kBatch) {
-        if (drawn > 0 && stop()) stopped = true;
-        const std::uint64_t batch = std::min(kBatch, chunk.count - drawn);
-        kernel.sample(*mine.workspace, *scene.medium->medium, mine.context, key, span.first + chunk.first + drawn, batch,
-                      cell.quantity, mine.block, out.counters);
-        const auto drawn_at = Clock::now();
-        if (span.keep) result.kept.keep(ray, span.first + chunk.first + drawn, batch, mine.block.values);
-        mine.errors.resize(batch * outputs);
-        for (std::size_t o = 0; o < outputs; ++o) {
-          const Real target = targets.mean[ray * outputs + o];
-          const std::span<Real> errors(&mine.errors[o * batch], batch);
-          const std::span<const Real> counted = take_errors(mine, o, target, errors, out);
-          if (span.only_evidence) continue;
-          out.blocks[o].add(ray, counted, out.moments[local * outputs + o]);
-          out.groups[o].add(counted);
-        }
-        if (!span.only_evidence) out.lookups_squared[local] += sum_of_squares(mine.block.lookups);
-        const auto counted_at = Clock::now();
-        for (std::size_t o = 0; o < outputs && plan; ++o) {
-          const std::span<Real> errors(&mine.errors[o * batch], batch);
-          if (const Real shift = plan->shift[ray * outputs + o]; shift != 0)
-            for (Real& error : errors) error -= shift;
-          evidences.add_errors(ray, o, errors);
-          if (!varies) continue;
-          for (Real& error : errors) error = error * error - plan->stated_variance[ray * outputs + o];
-          variances.add_errors(ray, o, errors);
-        }
-        evidences.add_lookups(ray, mine.block.lookups);
-        const auto judged_at = Clock::now();
-        out.statistics += judged_at - drawn_at;
-        out.judging += judged_at - counted_at;
-      }
-      out.lookups[local] = out.counters.lookups - lookups_before;
-      out.null_collisions[local] = out.counters.null_collisions - null_collisions_before;
-      for (std::size_t o = 0; o < outputs; ++o) {
-        out.group_sums[o] = out.moments[local * outputs + o].s1;
-        out.groups[o].finish_ray();
-      }
-    }
-    const auto drawn_at = Clock::now();
-    evidences.finish();
-    variances.finish();
-    const auto judged_at = Clock::now();
-    out.statistics += judged_at - drawn_at;
-    out.judging += judged_at - drawn_at;
-    out.working += judged_at - begun;
+    if (stops()) return;
+    sampler.sample(chunks[at], scratch.local(), parts[at], stops);
     progress(static_cast<double>(++done) / static_cast<double>(chunks.size()));
   });
   if (stopped) return std::nullopt;
 
-  std::vector<GroupErrors> across(outputs);  // groups larger than a chunk, within one ray
-  for (std::size_t at = 0; at < chunks.size(); ++at) {
-    const Chunk& chunk = chunks[at];
-    const ChunkResult& part = results[at];
-    for (std::size_t ray = chunk.first_ray; ray < chunk.end_ray; ++ray) {
-      for (std::size_t o = 0; o < outputs; ++o)
-        result.moments[ray * outputs + o] += part.moments[(ray - chunk.first_ray) * outputs + o];
-      result.lookups[ray] += part.lookups[ray - chunk.first_ray];
-      result.null_collisions[ray] += part.null_collisions[ray - chunk.first_ray];
-      result.lookups_squared[ray] += part.lookups_squared[ray - chunk.first_ray];
-    }
-    for (std::size_t o = 0; o < outputs; ++o) {
-      result.groups[o] += part.groups[o];
-      result.blocks[o] += part.blocks[o];
-      if (span.per_ray <= whole_chunk || span.only_evidence) continue;
-      if (chunk.first == 0) across[o].finish_ray();
-      if (chunk.count == whole_chunk) across[o].carry(static_cast<std::size_t>(level), part.group_sums[o]);
-    }
-    result.counters += part.counters;
-    result.nonfinite += part.nonfinite;
-    result.out_of_range += part.out_of_range;
-    result.largest = std::max(result.largest, part.largest);
-    result.statistics_seconds += std::chrono::duration<double>(part.statistics).count();
-    result.judging_seconds += std::chrono::duration<double>(part.judging).count();
-    result.working_seconds += std::chrono::duration<double>(part.working).count();
-    for (const auto& [test, evidence] : part.evidence) result.evidence[test] += evidence;
-    for (const auto& [test, evidence] : part.variances) result.variances[test] += evidence;
-  }
-  if (span.per_ray > whole_chunk && !span.only_evidence) {
-    // A chunk's own groups already hold the level at which the chunks begin.
-    for (std::size_t o = 0; o < outputs; ++o) result.groups[o].append_above(static_cast<std::size_t>(level), across[o]);
-  }
+  for (std::size_t at = 0; at < chunks.size(); ++at) add_chunk(chunks[at], parts[at], outputs, result);
+  if (span.per_ray > whole_chunk && !span.only_evidence) add_groups_across(chunks, parts, level, result);
   return result;
 }
 

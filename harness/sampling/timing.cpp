@@ -132,6 +132,124 @@ void run_cell(benchmark::State& state, const TimedCell& timed, const std::vector
   state.counters["lookups"] = static_cast<double>(counters.lookups);
 }
 
+const std::string kLoopName = "loop";
+
+std::string batch_name(std::size_t cell, std::uint64_t samples) { return fmt::format("{}/{}", cell, samples); }
+
+void initialise_once() {
+  static const bool initialised = [] {
+    char name[] = "nullmark", interleave[] = "--benchmark_enable_random_interleaving=true";
+    char* arguments[] = {name, interleave, nullptr};
+    int count = 2;
+    benchmark::Initialize(&count, arguments);
+    return true;
+  }();
+  (void)initialised;
+}
+
+/// Registers what is timed, interleaved, in one process.
+class Registration {
+ public:
+  explicit Registration(const TimingPlan& plan) : plan_(plan) {}
+
+  std::size_t count() const { return count_; }
+
+  template <class Run>
+  void add(const std::string& name, Run run) {
+    ++count_;
+    benchmark::RegisterBenchmark(name.c_str(), run)
+        ->Repetitions(plan_.repetitions)
+        ->MinTime(plan_.seconds)
+        ->UseRealTime()
+        ->Unit(benchmark::kNanosecond);
+  }
+
+  /// The cheapest possible steps, and reads of memory as large as the cells' volumes.
+  void add_floors(const std::vector<TimedCell>& cells) {
+    add_floor(floor_name(Precision::float64), time_lane_floor<Real>);
+    add_floor(floor_name(Precision::float32), time_lane_floor<float>);
+    std::set<std::size_t> sizes;
+    for (const TimedCell& cell : cells)
+      if (const std::size_t bytes = voxel_bytes(*cell.scene->medium->medium); bytes > 0 && sizes.insert(bytes).second)
+        add_floor(memory_name(bytes), [bytes](benchmark::State& state, std::uint64_t steps) {
+          const std::vector<float> buffer(bytes / sizeof(float), 1.f);
+          std::uint64_t at = 0;
+          for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(memory_floor_loop(buffer, at, steps));
+        });
+  }
+
+ private:
+  template <class Run>
+  void add_floor(const std::string& name, Run run) {
+    add(name, [run](benchmark::State& state) {
+      constexpr std::uint64_t kSteps = 4096;
+      run(state, kSteps);
+      state.counters["samples"] = static_cast<double>(state.iterations());
+      state.counters["lookups"] = static_cast<double>(static_cast<std::uint64_t>(state.iterations()) * kSteps);
+    });
+  }
+
+  const TimingPlan& plan_;
+  std::size_t count_ = 0;
+};
+
+/// The plain hand-written ratio loop.  Its inputs are volatile: Google Benchmark 1.7's DoNotOptimize of a double that is written
+/// corrupts it under GCC.
+void time_plain_loop(benchmark::State& state) {
+  PlainRng rng(2);
+  std::uint64_t lookups = 0, samples = 0;
+  volatile Real majorant = 30, extinction = 15;
+  for ([[maybe_unused]] auto _ : state) {
+    const Real mu = extinction;
+    for (int i = 0; i < 128; ++i)
+      benchmark::DoNotOptimize(plain_ratio_loop(
+          rng, majorant, [&](Real) { return mu; }, lookups));
+    samples += 128;
+  }
+  state.counters["samples"] = static_cast<double>(samples);
+  state.counters["lookups"] = static_cast<double>(lookups);
+}
+
+using Repetitions = std::map<std::string, std::vector<Repetition>>;
+
+Real median_per_lookup(const std::vector<Repetition>& repetitions) {
+  std::vector<Real> ns;
+  for (const Repetition& repetition : repetitions)
+    if (repetition.lookups > 0) ns.push_back(repetition.ns_per_iteration / repetition.lookups);
+  return ns.empty() ? 0 : median(ns);
+}
+
+/// Nothing where repetitions are missing.
+std::optional<TimeRecord> time_record(const TimedCell& cell, std::size_t index, const TimingPlan& plan, Repetitions& all) {
+  const auto whole = static_cast<std::size_t>(plan.repetitions);
+  const std::vector<Repetition>& repetitions = all[batch_name(index, plan.samples_per_traversal.back())];
+  if (repetitions.size() != whole) return std::nullopt;
+  TimeRecord time;
+  time.repetition_ns = sample_times(repetitions);
+  const BatchTime main = batch_time(plan.samples_per_traversal.back(), time.repetition_ns);
+  time.ns_per_sample = main.ns_per_sample;
+  time.mad = main.mad;
+  if (plan.samples_per_traversal.size() > 1)
+    for (const std::uint64_t samples : plan.samples_per_traversal)
+      if (const auto& of_batch = all[batch_name(index, samples)]; of_batch.size() == whole)
+        time.batches.push_back(batch_time(samples, sample_times(of_batch)));
+  std::vector<Real> waiting;
+  for (const Repetition& repetition : repetitions) waiting.push_back(repetition.waiting);
+  time.waiting = median(waiting);
+  time.ns_per_lookup = median_per_lookup(repetitions);
+  const auto ratio = [&](const std::string& to) {
+    const Real ns = median_per_lookup(all[to]);
+    return ns > 0 ? time.ns_per_lookup / ns : 0;
+  };
+  time.floor_ratio = ratio(floor_name(cell.cell->precision));
+  time.loop_ratio = ratio(kLoopName);
+  if (const std::size_t bytes = voxel_bytes(*cell.scene->medium->medium); bytes > 0)
+    time.memory_ratio = ratio(memory_name(bytes));
+  time.repetitions = plan.repetitions;
+  time.samples_per_traversal = plan.samples_per_traversal.back();
+  return time;
+}
+
 }  // namespace
 
 Real waiting_share(Real wall_seconds, Real thread_seconds) {
@@ -141,110 +259,28 @@ Real waiting_share(Real wall_seconds, Real thread_seconds) {
 std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& plan,
                                                   const std::function<bool()>& stop,
                                                   const std::function<void(double)>& progress) {
-  static const bool initialised = [] {
-    char name[] = "nullmark", interleave[] = "--benchmark_enable_random_interleaving=true";
-    char* arguments[] = {name, interleave, nullptr};
-    int count = 2;
-    benchmark::Initialize(&count, arguments);
-    return true;
-  }();
-  (void)initialised;
-
+  initialise_once();
   std::vector<std::optional<TimeRecord>> result(cells.size());
   if (cells.empty()) return result;
-  // Inputs of the loops are volatile: Google Benchmark 1.7's DoNotOptimize of a double that is written corrupts it under GCC.
-  const auto configure = [&](benchmark::internal::Benchmark* bench) {
-    bench->Repetitions(plan.repetitions)->MinTime(plan.seconds)->UseRealTime()->Unit(benchmark::kNanosecond);
-  };
-  const std::string loop_name = "loop";
-  std::size_t extra = 1;
-  const auto add_floor = [&](const std::string& name, auto run) {
-    ++extra;
-    configure(benchmark::RegisterBenchmark(name.c_str(), [run](benchmark::State& state) {
-      constexpr std::uint64_t kSteps = 4096;
-      run(state, kSteps);
-      state.counters["samples"] = static_cast<double>(state.iterations());
-      state.counters["lookups"] = static_cast<double>(static_cast<std::uint64_t>(state.iterations()) * kSteps);
-    }));
-  };
-  add_floor(floor_name(Precision::float64), time_lane_floor<Real>);
-  add_floor(floor_name(Precision::float32), time_lane_floor<float>);
-  std::set<std::size_t> sizes;
-  for (const TimedCell& cell : cells)
-    if (const std::size_t bytes = voxel_bytes(*cell.scene->medium->medium); bytes > 0 && sizes.insert(bytes).second)
-      add_floor(memory_name(bytes), [bytes](benchmark::State& state, std::uint64_t steps) {
-        const std::vector<float> buffer(bytes / sizeof(float), 1.f);
-        std::uint64_t at = 0;
-        for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(memory_floor_loop(buffer, at, steps));
-      });
-  configure(benchmark::RegisterBenchmark(loop_name.c_str(), [](benchmark::State& state) {
-    PlainRng rng(2);
-    std::uint64_t lookups = 0, samples = 0;
-    volatile Real majorant = 30, extinction = 15;
-    for ([[maybe_unused]] auto _ : state) {
-      const Real mu = extinction;
-      for (int i = 0; i < 128; ++i)
-        benchmark::DoNotOptimize(plain_ratio_loop(
-            rng, majorant, [&](Real) { return mu; }, lookups));
-      samples += 128;
-    }
-    state.counters["samples"] = static_cast<double>(samples);
-    state.counters["lookups"] = static_cast<double>(lookups);
-  }));
-  const auto batch_name = [](std::size_t cell, std::uint64_t samples) { return fmt::format("{}/{}", cell, samples); };
+  Registration registration(plan);
+  registration.add_floors(cells);
+  registration.add(kLoopName, time_plain_loop);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const std::vector<std::size_t> rays = timed_rays(*cells[i].scene->rays);
     if (rays.empty()) continue;
     for (const std::uint64_t samples : plan.samples_per_traversal)
-      configure(benchmark::RegisterBenchmark(
-          batch_name(i, samples).c_str(),
-          [&cells, &stop, rays, i, samples](benchmark::State& state) { run_cell(state, cells[i], rays, samples, stop); }));
+      registration.add(batch_name(i, samples), [&cells, &stop, rays, i, samples](benchmark::State& state) {
+        run_cell(state, cells[i], rays, samples, stop);
+      });
   }
-  const std::size_t benches = cells.size() * plan.samples_per_traversal.size() + extra;
-  Collector collector(progress, benches * static_cast<std::size_t>(plan.repetitions));
+  Collector collector(progress, registration.count() * static_cast<std::size_t>(plan.repetitions));
   try {
     benchmark::RunSpecifiedBenchmarks(&collector);
   } catch (const Interrupted&) {
     return result;
   }
   benchmark::ClearRegisteredBenchmarks();
-
-  const auto per_lookup = [&](const std::string& name) {
-    std::vector<Real> ns;
-    for (const Repetition& repetition : collector.all[name]) ns.push_back(repetition.ns_per_iteration / repetition.lookups);
-    return ns.empty() ? 0 : median(ns);
-  };
-  const Real loop = per_lookup(loop_name);
-  const auto whole = static_cast<std::size_t>(plan.repetitions);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const std::vector<Repetition>& repetitions = collector.all[batch_name(i, plan.samples_per_traversal.back())];
-    if (repetitions.size() != whole) continue;
-    TimeRecord time;
-    time.repetition_ns = sample_times(repetitions);
-    const BatchTime main = batch_time(plan.samples_per_traversal.back(), time.repetition_ns);
-    time.ns_per_sample = main.ns_per_sample;
-    time.mad = main.mad;
-    if (plan.samples_per_traversal.size() > 1)
-      for (const std::uint64_t samples : plan.samples_per_traversal)
-        if (const auto& of_batch = collector.all[batch_name(i, samples)]; of_batch.size() == whole)
-          time.batches.push_back(batch_time(samples, sample_times(of_batch)));
-    std::vector<Real> lookup_ns, waiting;
-    for (const Repetition& repetition : repetitions) waiting.push_back(repetition.waiting);
-    time.waiting = median(waiting);
-    for (const Repetition& repetition : repetitions)
-      if (repetition.lookups > 0) lookup_ns.push_back(repetition.ns_per_iteration / repetition.lookups);
-    if (!lookup_ns.empty()) {
-      time.ns_per_lookup = median(lookup_ns);
-      const auto ratio = [&](Real to) { return to > 0 ? time.ns_per_lookup / to : 0; };
-      time.floor_ratio = ratio(per_lookup(floor_name(cells[i].cell->precision)));
-      time.loop_ratio = ratio(loop);
-      if (const std::size_t bytes = voxel_bytes(*cells[i].scene->medium->medium); bytes > 0)
-        time.memory_ratio = ratio(per_lookup(memory_name(bytes)));
-    }
-    time.repetitions = plan.repetitions;
-    time.samples_per_traversal = plan.samples_per_traversal.back();
-    result[i] = time;
-  }
+  for (std::size_t i = 0; i < cells.size(); ++i) result[i] = time_record(cells[i], i, plan, collector.all);
   return result;
 }
 

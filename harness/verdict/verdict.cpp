@@ -60,6 +60,15 @@ std::string within_text(const std::vector<const TestRecord*>& tests, const char*
   return fmt::format("{} < {:.2g} % of the mean", error, 100 * of / std::abs(widest->reference));
 }
 
+void decide_laws(VerdictRecord& verdict) {
+  verdict.lawful = verdict.laws.empty() ? Outcome::none : Outcome::pass;
+  const Real broken = std::log(static_cast<Real>(verdict.laws_family) / verdict.alpha);
+  for (LawRecord& law : verdict.laws) {
+    law.outcome = law.log_e >= broken ? Outcome::fail : Outcome::pass;
+    if (law.outcome == Outcome::fail) verdict.lawful = Outcome::fail;
+  }
+}
+
 }  // namespace
 
 Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
@@ -106,12 +115,7 @@ void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
     if (test.outcome == Outcome::pass && proof.biased) slightly = &test;
   }
   verdict.within = means > 0 && within.size() == means;
-  verdict.lawful = verdict.laws.empty() ? Outcome::none : Outcome::pass;
-  const Real broken = std::log(static_cast<Real>(verdict.laws_family) / verdict.alpha);
-  for (LawRecord& law : verdict.laws) {
-    law.outcome = law.log_e >= broken ? Outcome::fail : Outcome::pass;
-    if (law.outcome == Outcome::fail) verdict.lawful = Outcome::fail;
-  }
+  decide_laws(verdict);
   const bool drawn_as_planned = lenient || verdict.samples_per_ray >= verdict.planned;
   const auto reason = [&](const TestRecord& test, const std::string& text) {
     verdict.reason = place_of(test, outputs, means) + text;

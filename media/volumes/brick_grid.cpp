@@ -2,6 +2,7 @@
 
 #include <bit>
 
+#include "media/volumes/brick_grid_summary.h"
 #include "media/volumes/machine_memory.h"
 
 namespace nullmark {

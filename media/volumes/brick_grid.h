@@ -129,6 +129,13 @@ class BrickGrid {
   static int rounded(Real x) { return static_cast<int>(x + std::copysign(0.49999999999999994, x)); }
 
  private:
+  // Of brick_grid_summary.h, which defines the first `summary`.
+  struct Stretch;
+  struct Stretches;
+  struct RangeSums;
+  template <class Weights>
+  Stretches stretches(const IndexBox& range, const Weights& weights) const;
+
   struct BrickSummary {
     float minimum, maximum;
     Real sum;
@@ -320,89 +327,6 @@ std::optional<Index3> BrickGrid::find(const Predicate& predicate) const {
         }
   }
   return first;
-}
-
-template <class Weights>
-RangeSummary BrickGrid::summary(const IndexBox& range, const Weights& weights, Real weight) const {
-  struct Stretch {
-    int begin, end;  // inside the brick
-    std::array<Real, kSide> weights;
-    Real total;
-    bool whole;  // every voxel, at weight 1
-  };
-  // Per axis, the bricks of the table that the range meets.
-  std::array<std::vector<Stretch>, 3> stretches;
-  std::array<std::size_t, 3> first{};
-  bool outside = table_.empty();
-  for (std::size_t a = 0; a < 3; ++a) {
-    const int axis = static_cast<int>(a);
-    const int lo = std::max(range.lo[axis], table_lo_[a]), hi = std::min(range.hi[axis], table_hi_[a] - 1);
-    outside |= lo != range.lo[axis] || hi != range.hi[axis];
-    if (lo > hi) continue;
-    first[a] = static_cast<std::size_t>(lo - table_lo_[a]) / kSide;
-    for (int at = lo - (lo - table_lo_[a]) % kSide; at <= hi; at += kSide) {
-      Stretch s{std::max(lo - at, 0), std::min(hi - at + 1, kSide), {}, 0, true};
-      for (int i = s.begin; i < s.end; ++i) {
-        const Real w = s.weights[static_cast<std::size_t>(i)] = weights(axis, at + i);
-        s.total += w;
-        s.whole &= w == 1;
-      }
-      s.whole &= s.end - s.begin == kSide;
-      stretches[a].push_back(s);
-    }
-  }
-
-  RangeSummary result;
-  Real sum = 0, covered = 0;
-  const auto add_voxels = [&](const float* values, const Stretch& x, const Stretch& y, const Stretch& z) {
-    for (int i = x.begin; i < x.end; ++i)
-      for (int j = y.begin; j < y.end; ++j) {
-        const Real w = x.weights[static_cast<std::size_t>(i)] * y.weights[static_cast<std::size_t>(j)];
-        for (int k = z.begin; k < z.end; ++k) {
-          const Real v = values[i * kSteps[0] + j * kSteps[1] + k];
-          result.minimum = std::min(result.minimum, v);
-          result.maximum = std::max(result.maximum, v);
-          sum += w * z.weights[static_cast<std::size_t>(k)] * v;
-        }
-      }
-  };
-  const std::size_t high = stretches[2].size();
-  for (std::size_t i = 0; i < stretches[0].size(); ++i) {
-    const std::size_t slice = ((first[0] + i) * shape_[1] + first[1]) * shape_[2] + first[2];
-    const std::size_t slice_end = std::min(slice + stretches[1].size() * shape_[2], table_.size());
-    if (table_.unset_until(slice, slice_end) == slice_end) {
-      outside = true;
-      continue;
-    }
-    for (std::size_t j = 0; j < stretches[1].size(); ++j)
-      for (std::size_t row = slice + j * shape_[2], end = row + high, b = row; b < end; ++b) {
-        const std::uint32_t brick = table_[b];
-        if (brick == 0) {
-          outside = true;
-          b = std::max(b + 1, table_.unset_until(b + 1, end)) - 1;
-          continue;
-        }
-        const Stretch &x = stretches[0][i], &y = stretches[1][j], &z = stretches[2][b - row];
-        const BrickSummary& all = summaries_[brick];
-        const Real w = x.total * y.total * z.total;
-        covered += w;
-        const bool whole = x.whole && y.whole && z.whole;
-        if (!whole && all.minimum != all.maximum) {
-          add_voxels(values_.data() + brick * kBrickValues, x, y, z);
-          continue;
-        }
-        result.minimum = std::min<Real>(result.minimum, all.minimum);
-        result.maximum = std::max<Real>(result.maximum, all.maximum);
-        sum += whole ? all.sum : w * all.minimum;
-      }
-  }
-  if (outside) {
-    result.minimum = std::min<Real>(result.minimum, background_);
-    result.maximum = std::max<Real>(result.maximum, background_);
-    sum += background_ * (weight - covered);
-  }
-  result.average = weight > 0 ? std::clamp(sum / weight, result.minimum, result.maximum) : result.minimum;
-  return result;
 }
 
 }  // namespace nullmark

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "media/base/registry.h"
+#include "media/volumes/brick_grid_summary.h"
 #include "media/volumes/vdb_reader.h"
 
 namespace nullmark {

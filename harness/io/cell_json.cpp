@@ -1,0 +1,383 @@
+#include <fmt/format.h>
+
+#include <limits>
+
+#include "harness/io/results_json.h"
+#include "harness/io/spec_fields.h"
+#include "harness/io/spec_json.h"
+#include "harness/io/transport_json.h"
+#include "harness/io/verdict_json.h"
+#include "harness/model/cost.h"
+#include "harness/model/metrics.h"
+#include "harness/registry/components.h"
+
+namespace nullmark {
+namespace {
+
+/// A point and a list of three numbers look alike in JSON; only the registry can tell.
+bool is_point(ComponentKind kind, const std::string& type, const std::string& parameter) {
+  try {
+    for (const ParameterInfo& info : parameters_of(kind, type))
+      if (info.name == parameter) return std::holds_alternative<std::array<Real, 3>>(info.default_value);
+  } catch (const ParameterError&) {
+    // Results of plug-ins that are not linked in can be read all the same.
+  }
+  return false;
+}
+
+ParameterValue read_parameter(ComponentKind kind, const std::string& type, const std::string& name, const JsonNode& node) {
+  const Json& json = node.json();
+  if (json.is_boolean()) return json.get<bool>();
+  if (json.is_number_float()) return json.get<Real>();
+  if (json.is_number()) return static_cast<int>(node.integer(std::numeric_limits<int>::min(), std::numeric_limits<int>::max()));
+  if (!json.is_array()) return node.string();
+  std::vector<Real> numbers;
+  for (const JsonNode& element : node.elements()) numbers.push_back(element.number());
+  if (numbers.size() == 3 && is_point(kind, type, name)) return std::array{numbers[0], numbers[1], numbers[2]};
+  return numbers;
+}
+
+/// The parameters of a registered type.
+struct ParametersField {
+  Component& component;
+  ComponentKind kind;
+
+  Json json() const { return parameters_json(component.values); }
+  void read(const JsonNode& node) const {
+    node.expect_object();
+    for (const auto& [name, json] : node.json().items())
+      component.values[name] = read_parameter(kind, component.type, name, node[name]);
+  }
+  Json schema() const { return {{"type", "object"}}; }
+};
+
+template <class Visit>
+void visit_component(Visit& visit, Component& component, ComponentKind kind, std::string& label) {
+  visit.required("type", component.type);
+  visit.required("params", ParametersField{component, kind});
+  visit.required("label", label);
+  if constexpr (Visit::kReads) component.pointer = visit.node().where();
+}
+
+struct ComponentField {
+  Component& component;
+  ComponentKind kind;
+
+  Json json() const {
+    FieldWriter visit;
+    visit_component(visit, component, kind, component.label);
+    return visit.take();
+  }
+  void read(const JsonNode& node) const {
+    FieldReader visit(node);
+    visit_component(visit, component, kind, component.label);
+  }
+  Json schema() const {
+    FieldSchema visit(false);
+    visit_component(visit, component, kind, component.label);
+    return visit.take();
+  }
+};
+
+Json medium_record_json(const MediumSpec& medium);
+MediumSpec read_medium_record(const JsonNode& node);
+
+struct MediaField {
+  std::vector<MediumSpec>& media;
+
+  bool empty() const { return media.empty(); }
+  Json json() const {
+    Json list = Json::array();
+    for (const MediumSpec& medium : media) list.push_back(medium_record_json(medium));
+    return list;
+  }
+  void read(const JsonNode& node) const {
+    for (const JsonNode& medium : node.elements()) media.push_back(read_medium_record(medium));
+  }
+  Json schema() const { return list_schema({{"type", "object"}}); }
+};
+
+/// Numbers from 0 to `most`, one for all channels or one each.
+struct PerChannelField {
+  std::vector<Real>& values;
+  Real most;
+
+  bool empty() const { return values.empty(); }
+  Json json() const { return values; }
+  void read(const JsonNode& node) const { values = read_per_channel(node, most); }
+  Json schema() const { return list_schema({{"type", "number"}, {"minimum", 0}}); }
+};
+
+/// {"radiance": ..., "field": ...}
+struct EmissionField {
+  MediumSpec& medium;
+
+  bool empty() const { return medium.emission.empty(); }
+  Json json() const {
+    Json json = {{"radiance", medium.emission}};
+    if (!medium.emission_field.empty()) json["field"] = medium_record_json(medium.emission_field[0]);
+    return json;
+  }
+  void read(const JsonNode& node) const {
+    medium.emission = read_per_channel(node["radiance"], kInfinity);
+    if (node.has("field")) medium.emission_field.push_back(read_medium_record(node["field"]));
+  }
+  Json schema() const { return {{"type", "object"}}; }
+};
+
+}  // namespace
+
+template <class Visit>
+void visit_fields(Visit& visit, MediumSpec& medium) {
+  visit_component(visit, medium.field, ComponentKind::medium, medium.label);
+  if constexpr (Visit::kReads) medium.field.label = medium.label;
+  visit.sparse("spectrum", medium.spectrum);
+  visit.sparse("media", MediaField{medium.per_channel});
+  visit.sparse("albedo", PerChannelField{medium.albedo, 1});
+  visit.sparse("anisotropy", medium.anisotropy);
+  visit.sparse("emission", EmissionField{medium});
+  visit.sparse("optional", medium.optional);
+}
+
+namespace {
+
+Json medium_record_json(const MediumSpec& medium) { return fields_json(medium); }
+
+MediumSpec read_medium_record(const JsonNode& node) {
+  MediumSpec medium;
+  read_fields(node, medium);
+  return medium;
+}
+
+Json reals_schema() { return {{"type", {"number", "array", "null"}}, {"items", {{"type", {"number", "null"}}}}}; }
+
+Json reals_json(const std::vector<std::optional<Real>>& values, int outputs) {
+  if (outputs == 1) return values.empty() ? Json(nullptr) : number_or_null(values[0]);
+  Json list = Json::array();
+  for (const std::optional<Real>& value : values) list.push_back(number_or_null(value));
+  return list.empty() ? Json(nullptr) : list;
+}
+
+/// The inverse, for a sampled cell.
+std::vector<std::optional<Real>> read_reals(const JsonNode& node, int outputs) {
+  const auto size = static_cast<std::size_t>(outputs);
+  const auto one = [](const JsonNode& number) { return number.json().is_null() ? std::nullopt : std::optional(number.number()); };
+  if (node.json().is_null()) return std::vector<std::optional<Real>>(size);
+  if (outputs == 1) return {one(node)};
+  if (!node.json().is_array() || node.json().size() != size) node.expected(fmt::format("a list of {} numbers", outputs));
+  std::vector<std::optional<Real>> values;
+  for (const JsonNode& element : node.elements()) values.push_back(one(element));
+  return values;
+}
+
+/// A number, or a list of one per output where there are several; null where the cell was not sampled.
+struct RealsField {
+  std::vector<std::optional<Real>>& values;
+  int outputs;
+
+  Json json() const { return reals_json(values, outputs); }
+  void read(const JsonNode& node) const { values = read_reals(node, outputs); }
+  Json schema() const { return reals_schema(); }
+};
+
+/// The same of a member of all of a record's channels.
+struct ChannelsField {
+  CellRecord& record;
+  std::optional<Real> ChannelRecord::*member;
+
+  Json json() const {
+    std::vector<std::optional<Real>> values;
+    for (const ChannelRecord& channel : record.channel) values.push_back(channel.*member);
+    return reals_json(values, outputs_of(record));
+  }
+  void read(const JsonNode& node) const {
+    if (record.samples == 0) return;
+    const std::vector<std::optional<Real>> values = read_reals(node, outputs_of(record));
+    record.channel.resize(values.size());
+    for (std::size_t c = 0; c < values.size(); ++c) record.channel[c].*member = values[c];
+  }
+  Json schema() const { return reals_schema(); }
+};
+
+/// A figure that is computed of each channel.
+struct DerivedReals {
+  std::vector<std::optional<Real>> values;
+  int outputs = 1;
+
+  Json json() const { return reals_json(values, outputs); }
+  Json schema() const { return reals_schema(); }
+  bool empty() const { return values.empty(); }
+};
+
+DerivedReals each_channel(const CellRecord& record, std::optional<Real> figure(const CellRecord&, std::size_t)) {
+  DerivedReals reals{{}, outputs_of(record)};
+  for (std::size_t c = 0; c < record.channel.size(); ++c) reals.values.push_back(figure(record, c));
+  return reals;
+}
+
+template <class Visit>
+void visit_time(Visit& visit, TimeRecord& time, const CellRecord& record) {
+  visit.required("ns_per_sample", time.ns_per_sample);
+  visit.required("ns_per_lookup", time.ns_per_lookup);
+  visit.lenient("floor_ratio", time.floor_ratio, "ns_per_lookup over the cheapest possible step");
+  visit.sparse("memory_ratio", NullMeansField{time.memory_ratio, 0},
+               "of volumes: ns_per_lookup over one read of a random cache line");
+  visit.lenient("loop_ratio", time.loop_ratio, "ns_per_lookup over a plain ratio loop on a constant medium");
+  visit.required("repetitions", time.repetitions);
+  visit.lenient("mad", time.mad, "median absolute deviation of ns_per_sample");
+  visit.lenient("waiting", time.waiting, "share of the wall time in which the timed thread did not run");
+  visit.required("threads", time.threads);
+  visit.derived("traversal_included", [] { return true; });
+  visit.lenient("samples_per_traversal", time.samples_per_traversal);
+  visit.list("batches", time.batches, [](auto& inner, auto& batch) {
+    inner.required("samples_per_traversal", AtLeastField{batch.samples_per_traversal, 1});
+    inner.required("ns_per_sample", batch.ns_per_sample);
+    inner.required("mad", batch.mad);
+  });
+  visit.lenient("repetition_ns", time.repetition_ns, "ns_per_sample of each repetition");
+  visit.lenient("majorant_build_seconds", time.majorant_build_seconds);
+  visit.derived("variance_x_ns", [&] { return each_channel(record, variance_x_ns); });
+  visit.derived("seconds_to_1pct", [&]() -> std::optional<Real> {
+    const std::optional<Cost> cost = cost_of(record);
+    const std::optional<Interval> seconds = cost ? seconds_to(*cost, 0.01) : std::nullopt;
+    return seconds ? std::optional(seconds->value) : std::nullopt;
+  });
+}
+
+struct TransportField {
+  TransportSpec& value;
+
+  Json json() const { return transport_json(value); }
+  void read(const JsonNode& node) const { value = read_transport(node); }
+  Json schema() const { return transport_schema(); }
+};
+
+/// Evidence; null where nothing was tested.
+struct VerdictField {
+  std::optional<VerdictRecord>& value;
+
+  Json json() const { return value ? verdict_json(*value) : Json(nullptr); }
+  void read(const JsonNode& node) const {
+    if (!node.json().is_null()) value = read_verdict(node);
+  }
+  Json schema() const { return verdict_schema(); }
+};
+
+/// What the cell is.
+template <class Visit>
+void visit_cell(Visit& visit, CellRecord& record) {
+  auto& cell = record.cell;
+  visit.required("id", cell.id, "hash of all that decides the statistics, 16 hexadecimal digits");
+  visit.required("name", cell.name);
+  visit.required("experiment", cell.experiment);
+  visit.part("estimator", [&](auto& inner) {
+    visit_component(inner, cell.estimator, ComponentKind::estimator, cell.estimator.label);
+    inner.required("claims", record.claims);
+    inner.required("range", record.range);
+    inner.sparse("order", record.order, "of a consistent estimator's bias in its step");
+    inner.sparse("given_depth", record.given_depth, "the estimator is handed the exact optical depth");
+  });
+  visit.part("medium", [&](auto& inner) {
+    visit_fields(inner, record.medium);
+    inner.lenient("hash", record.medium_hash);
+  });
+  visit.part("majorant", [&](auto& inner) {
+    visit_component(inner, record.majorant, ComponentKind::majorant, record.majorant.label);
+    bool built = record.structure.has_value();
+    StructureSize size = record.structure.value_or(StructureSize{});
+    inner.when("cells", built, size.cells, "regions with bounds of their own");
+    inner.when("nodes", built, size.nodes, "of a tree, leaves included; 0: no tree");
+    inner.when("bytes", built, size.bytes, "of memory");
+    if constexpr (Visit::kReads)
+      if (built) record.structure = size;
+  });
+  visit.required("ray_set", ComponentField{record.ray_set, ComponentKind::ray_set});
+  visit.required("quantity", cell.quantity);
+  visit.lenient("precision", cell.precision);
+  visit.part("measurement", [&](auto& inner) { visit_fields(inner, cell.measurement); });
+  visit.lenient("transport", TransportField{cell.transport});
+  visit.required("channels", WithinField{record.channels, 1, kMaxChannels});
+  visit.lenient("outputs", record.outputs, "what each entry of the statistics is, where not a channel");
+  visit.required("effects", record.effects);
+  visit.required("rays", record.rays);
+  visit.required("samples_per_ray", cell.samples_per_ray);
+  visit.sparse("equal_lookups", cell.equal_lookups);
+  visit.required("samples", record.samples, "over all rays");
+  visit.required("seed", cell.seed);
+  visit.required("own_streams", cell.own_streams);
+}
+
+/// What was measured and found.
+template <class Visit>
+void visit_findings(Visit& visit, CellRecord& record) {
+  const auto statistic = [&](std::optional<Real> ChannelRecord::*member) { return ChannelsField{record, member}; };
+  visit.required("status", record.status);
+  visit.sparse("reason", record.reason);
+  visit.sparse("reliance", record.reliance,
+               "of an estimator that is handed the exact optical depth: how much of its answer follows that depth, 1 all of it");
+  visit.required("mean", statistic(&ChannelRecord::mean), "average over the rays");
+  visit.part("reference", [&](auto& inner) {
+    inner.required("value", statistic(&ChannelRecord::reference), "average over the rays");
+    inner.required("error", statistic(&ChannelRecord::reference_error), "bound on the reference's own error");
+    inner.lenient("rms", statistic(&ChannelRecord::reference_rms), "root mean square over the rays");
+    inner.required("method", record.reference_method);
+  });
+  visit.required("bias", statistic(&ChannelRecord::bias), "mean - reference");
+  visit.lenient("bias_theory", statistic(&ChannelRecord::bias_theory), "mean that the estimator predicts - reference");
+  visit.required("rmse", statistic(&ChannelRecord::rmse), "root mean square error of the rays' means");
+  visit.lenient("rmse_theory", statistic(&ChannelRecord::rmse_theory), "what theory predicts for rmse");
+  visit.required("variance", statistic(&ChannelRecord::variance), "per sample, averaged over the rays");
+  visit.lenient("variance_theory", statistic(&ChannelRecord::variance_theory), "what theory predicts for variance");
+  visit.lenient("variance_basis", record.variance_basis, "analytic, sample, or empty");
+  visit.lenient("relative_variance", statistic(&ChannelRecord::relative_variance),
+                "variance, analytic where known, over the mean square of the reference");
+  visit.lenient("kurtosis", statistic(&ChannelRecord::kurtosis), "of the errors around the reference, pooled");
+  visit.lenient("lookups_per_sample", record.lookups_per_sample);
+  visit.lenient("lookups_theory", record.lookups_theory);
+  visit.lenient("null_collisions_per_sample", record.null_collisions_per_sample);
+  visit.lenient("rng_draws_per_sample", record.draws_per_sample);
+  visit.lenient("lookups", record.lookups, "over all samples");
+  visit.lenient("rng_draws", record.draws, "over all samples");
+  visit.lenient("lookups_variance", record.lookups_variance, "of one sample's lookups, averaged over the rays");
+  visit.lenient("squared_error_blocks", record.squared_error_blocks,
+                "mean squared error of 16 disjoint parts of the samples, cut alike for all estimators; averaged over channels");
+  visit.lenient("majorant_violations", record.majorant_violations);
+  visit.lenient("largest_violation", record.largest_violation, "extinction over majorant, where above 1");
+  visit.lenient("largest_sample", record.largest_sample, "greatest absolute value of a finite sample, before any measurement");
+  visit.lenient("nonfinite", record.nonfinite);
+  visit.lenient("verdict", VerdictField{record.verdict}, "evidence for and against the claims; see harness/verdict/verdict.md");
+}
+
+}  // namespace
+
+template <class Visit>
+void visit_fields(Visit& visit, CellRecord& record) {
+  visit_cell(visit, record);
+  visit_findings(visit, record);
+  visit.optional_part("time", record.time, [&](auto& inner, auto& time) { visit_time(inner, time, record); });
+  visit.part("efficiency", [&](auto& inner) {
+    inner.derived(
+        "variance_x_lookups", [&] { return each_channel(record, variance_x_lookups); }, "lower is better");
+  });
+  visit.list("convergence", record.convergence, [&](auto& inner, auto& step) {
+    inner.required("samples", step.samples);
+    inner.required("rmse", RealsField{step.rmse, outputs_of(record)}, "of means of so many samples");
+    inner.required("variance", RealsField{step.variance, outputs_of(record)}, "of means of so many samples");
+  });
+  visit.lenient("image_maximum", record.cell.image_maximum);
+  visit.sparse("instructions", record.instructions, "that drawing all samples took, counted in a simulator");
+  visit.when("images", record.cell.images, record.images);
+}
+
+Json cell_json(const CellRecord& record) { return fields_json(record); }
+
+CellRecord read_cell(const JsonNode& node) {
+  CellRecord record;
+  record.effects.clear();
+  read_fields(node, record);
+  return record;
+}
+
+Json cell_schema() { return fields_schema<CellRecord>(false); }
+
+}  // namespace nullmark
