@@ -323,8 +323,7 @@ class CommandLine {
 template <class Entry>
 void refuse_shared_names(const char* what) {
   const std::string& name = Registry<Entry>::instance().taken_twice();
-  if (!name.empty())
-    throw InputError(fmt::format("two {} are registered as \"{}\"; give the plug-in's another name", what, name));
+  if (!name.empty()) throw InputError(fmt::format("two {} are registered as \"{}\"; rename that of the plug-in", what, name));
 }
 
 ExitCode guarded(int argc, char** argv) {
@@ -340,7 +339,7 @@ ExitCode guarded(int argc, char** argv) {
   } catch (const ParameterError& error) {
     return report(ExitCode::input_error, (error.parameter.empty() ? "" : error.parameter + ": ") + error.what());
   } catch (const std::bad_alloc&) {
-    return report(ExitCode::input_error, "not enough memory for what is asked; use fewer rays, cells or grid cells");
+    return report(ExitCode::input_error, "not enough memory; use fewer rays, cells or grid cells");
   } catch (const std::system_error& error) {
     // Of fmt, where the terminal's or the pipe's end is a full disk.
     return report(ExitCode::internal_error, error.what());

@@ -125,7 +125,7 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
   const Json& json = plan.json;
   const JsonNode top(json, source.file);
   if (json.is_object() && json.contains("cells"))
-    throw InputError(source.file + ": these are results; nullmark check, compare and report read them");
+    throw InputError(source.file + ": is a results file; nullmark check, compare and report read it");
   top.expect_object();
   if (json.contains("$schema") && json["$schema"] == "nullmark/config/1")
     top["$schema"].fail(fmt::format(
@@ -216,7 +216,7 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
       throw InputError(fmt::format("{}: /timing: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
     if (!(file.error_rates == plan.error_rates))
-      throw InputError(fmt::format("{}: /verdict: differs from that of {}; expected the same, or run the files one by one",
+      throw InputError(fmt::format("{}: /error_rates: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
     for (const ConfiguredCell& configured : file.cells) builder.add(configured);
     plan.credits.insert(file.credits.begin(), file.credits.end());

@@ -146,7 +146,7 @@ void apply_single(const JsonNode& object, const std::string& key, ConfiguredCell
   const JsonNode node = object[key];
   const std::vector<Setter> values = read_axis(key, node);
   if (values.size() != 1)
-    node.fail(fmt::format("found {} values; expected one here, sweeps belong into \"matrix\"", values.size()));
+    node.fail(fmt::format("found {} values; expected one here; sweeps belong in \"matrix\"", values.size()));
   values[0](configured);
 }
 
@@ -338,7 +338,7 @@ std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t 
     node.fail("found neither \"matrix\" nor \"include\"; expected at least one");
   else
     for (const char* key : {"zip", "exclude", "constraints"})
-      if (node.has(key)) node[key].fail("found without \"matrix\", to which it applies");
+      if (node.has(key)) node[key].fail("found without \"matrix\"; it applies only to a matrix");
   if (node.has("include"))
     for (const JsonNode& entry : node["include"].elements()) {
       refuse_renamed(entry, "gate", "verdict");
