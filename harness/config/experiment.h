@@ -10,9 +10,9 @@
 
 namespace nullmark {
 
-/// A cell while its experiment is expanded: specifications in place of indices.
+/// A cell during the expansion of its experiment: it holds specifications instead of indices.
 struct ConfiguredCell {
-  std::string experiment;  ///< as the file calls it
+  std::string experiment;  ///< its name in the file
   std::optional<Component> estimator, rays;
   std::optional<MediumSpec> medium;
   std::optional<Component> majorant;
@@ -20,22 +20,22 @@ struct ConfiguredCell {
   Cell cell;
 };
 
-/// Whether a pattern, a partial cell, fits a cell.
+/// Whether a cell matches a pattern.
 using Test = std::function<bool(const ConfiguredCell&)>;
 
-/// Keys by which cells of an experiment differ.
+/// Keys in which the cells of an experiment can differ.
 const std::vector<std::string>& axes();
 
-/// A partial cell; all keys that are given must match.  Keys in `also` are someone else's.
+/// Reads a pattern: all its keys must match.  Keys in `also` are allowed and ignored.
 Test read_pattern(const JsonNode& node, const std::vector<std::string>& also = {});
 
 /// Whether two cells agree on an axis.
 bool agree_on(const std::string& axis, const ConfiguredCell& a, const ConfiguredCell& b);
 
-/// Throws InputError where a configuration has a key by the name it had in version 1.
+/// Throws InputError if a configuration uses the name that a key had in version 1.
 void refuse_renamed(const JsonNode& node, const char* before, const char* now);
 
-/// The cells of an experiment (format: config.md).  `seed` is that of cells that name none.
+/// The cells of an experiment (format: config.md).  Cells that name no seed get `seed`.
 std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t seed);
 
 }  // namespace nullmark

@@ -7,10 +7,10 @@
 
 namespace nullmark {
 
-/// JSON Schema (configured-07) of the configuration, generated from the registries.
+/// JSON Schema (draft-07) of the configuration, generated from the registries.
 Json config_schema();
 
-/// JSON Schema (configured-07) of the results.
+/// JSON Schema (draft-07) of the results.
 Json results_schema();
 
 /// A parameter's own schema: type, default, range and description, without sweeps.
