@@ -64,7 +64,7 @@ void add_matter_schema(Json& properties) {
        {one_or_list(number),
         closed_object({{"radiance", one_or_list(number)}, {"field", described(reference("medium"), "scales it in space")}},
                       {"radiance"})}},
-      {"description", "radiance L_e: a ray gains mu_a L_e a length"}};
+      {"description", "radiance L_e: a ray gains mu_a L_e per unit length"}};
   properties["optional"] = {{"type", "boolean"}, {"default", false}};
 }
 
@@ -107,18 +107,17 @@ Json definitions() {
       closed_object({{"clamp", described({{"type", "boolean"}, {"default", false}}, "every sample to [0,1]")},
                      {"quantise_bits", described({{"type", "integer"}, {"minimum", 0}, {"maximum", 31}, {"default", 0}},
                                                  "every sample to the nearest multiple of 1/(2^n - 1); 0: not at all")}});
-  const Json axes = {
-      {"estimator", reference("estimator")},
-      {"medium", reference("medium")},
-      {"majorant", described(reference("majorant"), "\"global\" where left out")},
-      {"rays", reference("rays")},
-      {"quantity", quantity},
-      {"samples_per_ray", whole(1)},
-      {"equal_lookups", described(positive(), "samples_per_ray = this over the expected lookups per sample")},
-      {"seed", whole(0)},
-      {"precision", described({{"enum", precision_names()}}, "numbers that walks are made of; \"double\" where left out")},
-      {"measurement", measurement},
-      {"transport", transport_schema()}};
+  const Json axes = {{"estimator", reference("estimator")},
+                     {"medium", reference("medium")},
+                     {"majorant", described(reference("majorant"), "default: \"global\"")},
+                     {"rays", reference("rays")},
+                     {"quantity", quantity},
+                     {"samples_per_ray", whole(1)},
+                     {"equal_lookups", described(positive(), "samples_per_ray = this / (expected lookups per sample)")},
+                     {"seed", whole(0)},
+                     {"precision", described({{"enum", precision_names()}}, "precision of walks; default: \"double\"")},
+                     {"measurement", measurement},
+                     {"transport", transport_schema()}};
   Json cell = axes, matrix = Json::object(), pattern = Json::object();
   for (const auto& [axis, schema] : axes.items()) {
     matrix[axis] = one_or_list(schema);
@@ -126,22 +125,22 @@ Json definitions() {
     pattern[axis] = component ? pattern_schema() : one_or_list(schema);
   }
   cell["images"] = {{"type", "boolean"}, {"default", false}};
-  cell["image_maximum"] = described(positive(), "value shown white");
+  cell["image_maximum"] = described(positive(), "value shown as white");
   cell["verdict"] = described(
       closed_object(
           {{"enabled", {{"type", "boolean"}, {"default", true}}},
-           {"epsilon", described(positive(), "|bias| that PASS excludes, relative to the mean reference")},
+           {"epsilon", described(positive(), "a PASS proves |bias| below this; relative to the mean reference")},
            {"max_samples_per_ray", described(whole(0),
                                              "drawn while the verdict is open; 0: samples_per_ray, and up to four times as many "
-                                             "where the plan says that they are enough")},
+                                             "if the plan says that they suffice")},
            {"max_lookups_per_ray", described(positive(), "expected lookups that all samples of a ray may cost")},
            {"laws", described({{"enum", law_policies()}},
-                              "when the laws of walks are tested: undecided means only where the mean cannot decide")},
+                              "when the laws of walks are tested; undecided: only if the mean cannot be decided")},
            {"tolerate", described({{"enum", tolerances()}},
-                                  "which bias is a FAIL: nothing means any that is proven, epsilon one beyond epsilon")},
+                                  "nothing: any proven bias is a FAIL; epsilon: only a bias proven beyond epsilon is")},
            {"samples", described({{"enum", sample_policies()}},
-                                 "what an undecided cell may draw: planned stops where the plan says that the allowance cannot "
-                                 "decide it, all draws the allowance all the same")}}),
+                                 "planned: an undecided cell draws no more if the plan says that its allowance does not suffice; "
+                                 "all: it draws its whole allowance")}}),
       "what the verdict must prove and may cost");
   cell["reference"] = described(closed_object({{"value", one_or_list(Json{{"type", "number"}})},
                                                {"error", {{"type", "number"}, {"minimum", 0}}},
@@ -149,10 +148,10 @@ Json definitions() {
                                               {"value", "error", "source"}),
                                 "a mean computed elsewhere, with a relative bound on its error");
   cell["own_streams"] = described({{"type", "boolean"}, {"default", false}},
-                                  "random streams keyed by the estimator too, instead of common random numbers");
+                                  "random streams depend on the estimator, instead of common random numbers");
   Json experiment = cell;
   experiment["name"] = {{"type", "string"}, {"minLength", 1}};
-  experiment["matrix"] = described(closed_object(std::move(matrix)), "axes of which all combinations are cells");
+  experiment["matrix"] = described(closed_object(std::move(matrix)), "axes; every combination is a cell");
   experiment["zip"] = described(list_of(list_of({{"type", "string"}}, 1)), "axes that advance together");
   experiment["exclude"] = list_of(reference("pattern"));
   experiment["include"] = list_of(reference("cell"));
@@ -165,8 +164,8 @@ Json definitions() {
        {"given", {{"type", "object"}, {"additionalProperties", {{"type", "number"}}}}},
        {"cells", {{"type", "object"}, {"additionalProperties", reference("selector")}}},
        {"theory", reference("selector")},
-       {"relative_to", described(reference("selector"), "whose metric divides the row's")},
-       {"tolerance", described(positive(), "relative; check fails where a cell is farther from the first given number")},
+       {"relative_to", described(reference("selector"), "the row's metric is divided by that of this cell")},
+       {"tolerance", described(positive(), "relative; check fails if a cell is farther from the first given number")},
        {"note", {{"type", "string"}}}},
       {"label"});
   const Json metric = {{"enum", metric_names()}};
@@ -181,7 +180,7 @@ Json definitions() {
        {"at_most", compared},
        {"at_least", compared},
        {"unbiased", described({{"const", true}}, "the verdict of every cell is PASS")},
-       {"factor", described({{"type", "number"}}, "on what is compared with")},
+       {"factor", described({{"type", "number"}}, "multiplies what is compared with")},
        {"tolerance", described(positive(), "relative, of \"near\"")},
        {"slope_against", described(metric, "compare the slope of log metric over the log of this one")}},
       {"cells"});
@@ -215,7 +214,7 @@ Json typed_schema() {
 
 Json majorant_schema() {
   Json json = typed_schema();
-  json["properties"].update(Json{{"cells", described(whole(1), "regions with bounds of their own")},
+  json["properties"].update(Json{{"cells", described(whole(1), "regions with their own bounds")},
                                  {"nodes", described(whole(0), "of a tree, leaves included; 0: no tree")},
                                  {"bytes", described(whole(0), "of memory")}});
   return json;
@@ -235,7 +234,10 @@ Json object_schema(Json properties, std::vector<std::string> required) {
 Json cell_schema() {
   const Json text = {{"type", "string"}};
   return object_schema(
-      {{"id", {{"type", "string"}, {"pattern", "^[0-9a-f]{16}$"}, {"description", "hash of all that decides the statistics"}}},
+      {{"id",
+        {{"type", "string"},
+         {"pattern", "^[0-9a-f]{16}$"},
+         {"description", "hash of everything that determines the statistics"}}},
        {"name", text},
        {"experiment", text},
        {"estimator", typed_schema()},
@@ -245,7 +247,7 @@ Json cell_schema() {
        {"quantity", {{"enum", quantity_names()}}},
        {"precision", {{"enum", precision_names()}}},
        {"channels", {{"type", "integer"}, {"minimum", 1}, {"maximum", kMaxChannels}}},
-       {"outputs", described(list_of(text), "what each entry of the statistics is, where not a channel")},
+       {"outputs", described(list_of(text), "names of the entries of the statistics, if they are not channels")},
        {"effects", list_of(text)},
        {"rays", whole(0)},
        {"samples_per_ray", whole(0)},
@@ -286,7 +288,7 @@ Json cell_schema() {
                                           "mean squared error of 16 disjoint parts of the samples, cut alike for all "
                                           "estimators; averaged over channels")},
        {"lookups_variance", described(nullable("number"), "of one sample's lookups, averaged over the rays")},
-       {"instructions", described(whole(0), "that drawing all samples took, counted in a simulator")},
+       {"instructions", described(whole(0), "instructions of drawing all samples, counted in a simulator")},
        {"majorant_violations", whole(0)},
        {"largest_violation", described(nullable("number"), "extinction over majorant, where above 1")},
        {"largest_sample", described(nullable("number"), "greatest absolute value of a finite sample, before any measurement")},
@@ -353,14 +355,14 @@ Json config_schema() {
         closed_object(
             {{"enabled", {{"type", "boolean"}, {"default", TimingPlan{}.enabled}}},
              {"repetitions", {{"type", "integer"}, {"minimum", 1}, {"maximum", 10'000}, {"default", TimingPlan{}.repetitions}}},
-             {"seconds", described(positive(), "least time of one repetition")},
+             {"seconds", described(positive(), "minimum time of one repetition")},
              {"samples_per_traversal",
               described({{"anyOf", {whole(1), list_of(whole(1), 1)}}},
                         "samples that share one walk through the majorant structure; of an ascending list the last is what a "
                         "cell's time says")}})},
        {"error_rates",
         closed_object({{"alpha", described(positive(), "chance of even one false FAIL in the whole configuration")},
-                       {"alpha_pass", described(positive(), "chance of a false PASS, of each test")}})},
+                       {"alpha_pass", described(positive(), "chance of a false PASS of one test")}})},
        {"experiments", list_of(reference("experiment"), 1)},
        {"tables", list_of(reference("table"))},
        {"claims", list_of(reference("claim"))},

@@ -133,7 +133,7 @@ Json transport_schema() {
   };
   const Json count = {{"type", {"integer", "null"}}, {"minimum", 0}};
   return {{"type", "object"},
-          {"description", "what light meets beside the medium, and how paths are sampled"},
+          {"description", "the scene around the medium, and how paths are sampled"},
           {"properties",
            {{"environment", radiance},
             {"surfaces",
