@@ -36,7 +36,7 @@ struct ControlChoice {
     visit.choice(
         "control", kind,
         {"minimum", "average", "middle", "maximum", "medium_average", "ray_average", "gamma", "given", "linear", "exponential"},
-        "control extinction: of the segment's bounds, of the medium or the ray, by the gamma rule, or given");
+        "control extinction: from the segment's bounds, the medium or the ray, by the gamma rule, or given");
     visit.number("value", value, Range::non_negative(), "1/length",
                  "control extinction (given), or at the ray's begin (linear, exponential)");
     visit.number("value_end", value_end, Range::non_negative(), "1/length",

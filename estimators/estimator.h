@@ -13,14 +13,14 @@
 
 namespace nullmark {
 
-// An estimator is a class template over Value with its parameters as fields.  A ray is RayData: the estimator's own type of that name,
-// or MediumRay<Value>.  harness/kernel/estimator_traits.h refuses a member of these names that has another signature.  Required:
+// An estimator is a class template over Value, with its parameters as fields.  RayData is the estimator's own type of that name,
+// or MediumRay<Value>.  harness/kernel/estimator_traits.h rejects members of these names with other signatures.  Required:
 //
 //   static constexpr kName, kSummary, kSource
-//       name in configurations, one line, paper and equation
+//       the name in configurations, a one-line summary, paper and equation
 //   static constexpr SampleRange kRange
 //   static constexpr bool kNeedsBound
-//       false where any positive rate leaves it unbiased
+//       false if it stays unbiased at any positive rate
 //   Guarantee claim(Quantity) const
 //   struct Walk
 //       the state of one sample
@@ -37,52 +37,53 @@ namespace nullmark {
 //   void check(const Extrema& medium) const
 //       throws ParameterError: parameters do not fit the medium
 //   SampleRange range() const
-//       where the range depends on the parameters
+//       if the range depends on the parameters
 //   Real order(Quantity) const
-//       of a consistent estimator: |bias| ~ h^order
+//       for consistent estimators: |bias| ~ h^order
 //   struct RayData : MediumRay<Value>; void prepare(RayData&) const
-//       data of its own for each ray
+//       the estimator's own data for each ray
 //   Value optical_depth(const Walk&, const RayData&) const
 //       answers Quantity::optical_depth as well
 //   Event<Value> event(const Walk&, const RayData&, const Flight& at) const
-//       how the flight ended, where it stands now: answers Quantity::free_path, drives paths
+//       how the flight ended at its current position: answers Quantity::free_path, and light paths use it
 //   bool samples_events(int channels) const
-//       false where there is no event for so many channels; default true
+//       false if there is no event for this many channels; default true
 //   Theory weight_theory(const RayData&, const RayProfile&, int channel) const
 //       of the event's weight and the lookups of the flight
 //   Value transmittance_at(const Walk&, const RayData&, Real distance) const
-//       estimate of T(begin, distance) by a walk that has met no collision since `distance`: answers Quantity::transmittance_profile
+//       estimate of T(begin, distance) by a walk that has met no collision since `distance`: answers
+//       Quantity::transmittance_profile
 //   Value expected(const Value& tau, const RayData&) const
 //       a target other than exp(-tau), e.g. a factor of T
 //   bool flies_once(int channels) const
-//       false where a sample is several flights or collides without a lookup; default true
+//       false if a sample takes several flights, or collides without a lookup; default true
 //   int real_collisions(const Walk&, const RayData&) const
 //       tentative collisions that ended a walk; default 0
 //   Theory theory(const RayData&, const RayProfile&, int channel, Quantity) const
 //   CountLaw count_law(const RayData&, const RayProfile&, int channel) const
 //       of a product of independent weights
 //   bool needs_optical_depth() const
-//       where kNeedsOpticalDepth depends on the parameters
+//       if kNeedsOpticalDepth depends on the parameters
 //   int component(const Walk&) const
-//       with kNeedsShares: the one component i of a sum that is looked up at a collision; `extinction` is then mu_i over its share,
-//       whose mean over the shares is mu
+//       with kNeedsShares: the one component i of a sum that is looked up at a collision; `extinction` is then mu_i over its
+//       share, whose mean over the shares is mu
 //   static constexpr bool kIgnoresMajorant
-//       lookups are no tentative collisions: not audited
+//       lookups are not tentative collisions: they are not checked against the majorant
 //   static constexpr bool kHeavySamples
-//       the fourth moment can be infinite while the variance is not, so that no number of samples shows it
+//       the fourth moment can be infinite although the variance is finite; no number of samples shows this
 //   static constexpr bool kHeavyLookups
-//       the number of lookups has no variance at the defaults, so that its mean over samples does not settle
+//       the number of lookups has infinite variance at the defaults, so its mean over samples does not settle
 //   static constexpr bool kOwnFlights
-//       draws its flights by a law of its own
+//       draws its flights by its own law
 //   static constexpr bool kLanes = true
-//       walks run side by side in registers, in double and in float: Walk holds nothing but Value, Distance<Value> and Truth<Value>;
-//       init, propose, consume and result take ray, flight and stream as auto and decide by select() and flight.next(rng, alive) where
-//       walks may differ (see lane_kernel.h)
+//       walks run side by side in registers, in double and in float: Walk holds only Value, Distance<Value> and Truth<Value>;
+//       init, propose, consume and result take ray, flight and stream as auto, and branch by select() and flight.next(rng, alive)
+//       where walks can differ (see lane_kernel.h)
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
-//       asks the harness to fill exact_depth, knots, distance_at_depth, shares
+//       the harness fills exact_depth, knots, distance_at_depth, shares
 //
-// An estimator that is derived from another withdraws an inherited member by a constant of its name: static constexpr bool count_law = false.
+// A derived estimator removes an inherited member by a constant of its name: static constexpr bool count_law = false.
 //
-// The loop, the counting, the majorant audit and the random streams are the harness's.
+// The harness runs the loop, counts lookups, checks the majorant and provides the random streams.
 
 }  // namespace nullmark

@@ -19,7 +19,8 @@ namespace nullmark {
 template <class Value>
 struct HeroWavelengthTracking {
   static constexpr const char* kName = "hero_wavelength";
-  static constexpr const char* kSummary = "delta tracking of one random channel, balance heuristic over all";
+  static constexpr const char* kSummary =
+      "delta tracking of one random channel, weighted by the balance heuristic over all channels";
   static constexpr const char* kSource = "Wilkie et al. 2014; Miller, Georgiev, Jarosz 2019";
   static constexpr SampleRange kRange = std::is_same_v<Value, Real> ? SampleRange::unit : SampleRange::non_negative;
   static constexpr bool kNeedsBound = true;

@@ -18,7 +18,8 @@ namespace nullmark {
 template <class Value>
 struct MajorantGuidedRatio {
   static constexpr const char* kName = "majorant_guided_ratio";
-  static constexpr const char* kSummary = "majorant-guided ratio tracking: flights at the rate of null collisions last seen";
+  static constexpr const char* kSummary =
+      "majorant-guided ratio tracking: each flight uses the null-collision rate of the last lookup";
   static constexpr const char* kSource = "Misso, Li, Burley, Teece, Jarosz 2023, Sec. 5";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;

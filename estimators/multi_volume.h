@@ -11,7 +11,7 @@ namespace nullmark {
 template <class Value>
 struct MultiVolumeTracking : DeltaTracking<Value> {
   static constexpr const char* kName = "multi_volume";
-  static constexpr const char* kSummary = "delta tracking through a sum of media, one component a collision";
+  static constexpr const char* kSummary = "delta tracking through a sum of media; each collision looks up one component";
   static constexpr const char* kSource = "Galtier et al. 2013; Kutz, Habel, Li, Novak 2017, Sec. 2";
   static constexpr bool kNeedsShares = true;
   static constexpr bool kLanes = false;

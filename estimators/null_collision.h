@@ -21,7 +21,7 @@ namespace nullmark {
 template <class Value>
 struct NullCollisionTracking {
   static constexpr const char* kName = "null_collision";
-  static constexpr const char* kSummary = "weighted tracking with event probabilities as given";
+  static constexpr const char* kSummary = "weighted tracking with given event probabilities";
   static constexpr const char* kSource = "Galtier et al. 2013; Kutz, Habel, Li, Novak 2017, Sec. 3";
   static constexpr SampleRange kRange = std::is_same_v<Value, Real> ? SampleRange::unit : SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;

@@ -12,7 +12,7 @@ namespace nullmark {
 template <class Value>
 struct PowerSeriesCmf {
   static constexpr const char* kName = "p_series_cmf";
-  static constexpr const char* kSummary = "power series: all terms up to .99 of the Poisson law, then roulette";
+  static constexpr const char* kSummary = "power series: sums all terms up to .99 of the Poisson law, then by Russian roulette";
   static constexpr const char* kSource = "Georgiev et al. 2019, p-series CMF";
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;

@@ -16,7 +16,7 @@ namespace nullmark {
 template <class Value>
 struct PowerSeriesCumulative {
   static constexpr const char* kName = "p_series_cumulative";
-  static constexpr const char* kSummary = "power series: terms are summed while they grow, then by roulette of their size";
+  static constexpr const char* kSummary = "power series: sums terms while they grow, then by Russian roulette on their size";
   static constexpr const char* kSource = "Georgiev et al. 2019, p-series cumulative";
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;

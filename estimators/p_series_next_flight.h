@@ -11,7 +11,8 @@ namespace nullmark {
 template <class Value>
 struct PowerSeriesNextFlight {
   static constexpr const char* kName = "p_series_next_flight";
-  static constexpr const char* kSummary = "power series: a Poisson number of terms, each over the chance to get to it";
+  static constexpr const char* kSummary =
+      "power series: a Poisson number of terms, each divided by the probability of reaching it";
   static constexpr const char* kSource = "Georgiev et al. 2019, p-series next-flight";
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;

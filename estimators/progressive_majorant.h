@@ -21,7 +21,7 @@ namespace nullmark {
 template <class Value>
 struct ProgressiveMajorant {
   static constexpr const char* kName = "progressive_majorant";
-  static constexpr const char* kSummary = "ratio tracking under bounds that earlier passes of the same sample have learned";
+  static constexpr const char* kSummary = "ratio tracking under bounds learned in earlier passes of the same sample";
   static constexpr const char* kSource = "Misso, Li, Burley, Teece, Jarosz 2023, Sec. 4";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
@@ -31,9 +31,9 @@ struct ProgressiveMajorant {
   Real initial = 0.01, margin = 0.2;
 
   void parameters(ParameterVisitor& visit) {
-    visit.integer("passes", passes, 0, 1'000'000, "passes that have learned before the one that is told");
-    visit.number("initial", initial, Range::positive(), "1/length", "bound of every cell at first");
-    visit.number("margin", margin, Range::non_negative(), "1/length", "what a violated bound is raised above the extinction");
+    visit.integer("passes", passes, 0, 1'000'000, "learning passes before the one that gives the result");
+    visit.number("initial", initial, Range::positive(), "1/length", "initial bound of every cell");
+    visit.number("margin", margin, Range::non_negative(), "1/length", "a violated bound is raised to the extinction plus this");
   }
 
   Guarantee claim(Quantity) const { return Guarantee::consistent; }

@@ -13,7 +13,8 @@ struct PublishedDecompositionTracking : AnalogDecompositionTracking<Value> {
   using typename Base::RayData, typename Base::Walk;
 
   static constexpr const char* kName = "analog_decomposition_published_reset";
-  static constexpr const char* kSummary = "decomposition tracking with a listing's residual path that starts anew (biased)";
+  static constexpr const char* kSummary =
+      "decomposition tracking as published in a listing: its residual path restarts at null collisions (biased)";
   static constexpr const char* kSource = "Kutz, Habel, Li, Novak 2017, Sec. 4.1, as a set of notes lists it";
   static constexpr bool kNeedsBound = false;
 

@@ -20,7 +20,7 @@ struct RatioRoulette {
 
   void parameters(ParameterVisitor& visit) {
     visit.number("threshold", threshold, Range::between(0, 1), "", "weight below which roulette is played");
-    visit.number("survival", survival, {0, 1, true}, "", "chance to go on; at least the threshold");
+    visit.number("survival", survival, {0, 1, true}, "", "probability of survival; at least the threshold");
   }
 
   void check(const Extrema&) const {

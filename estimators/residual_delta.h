@@ -10,7 +10,7 @@ namespace nullmark {
 template <class Value>
 struct ResidualDeltaTracking {
   static constexpr const char* kName = "residual_delta";
-  static constexpr const char* kSummary = "residual delta tracking: closed-form control times a delta estimate of the rest";
+  static constexpr const char* kSummary = "residual delta tracking: closed-form control times a delta estimate of the residual";
   static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Sec. 4";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = true;

@@ -15,7 +15,7 @@ namespace nullmark {
 template <class Value>
 struct ResidualRatioTracking {
   static constexpr const char* kName = "residual_ratio";
-  static constexpr const char* kSummary = "residual ratio tracking: closed-form control times a ratio estimate of the rest";
+  static constexpr const char* kSummary = "residual ratio tracking: closed-form control times a ratio estimate of the residual";
   static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Alg. 2";
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;

@@ -37,9 +37,9 @@ struct UnbiasedRayMarching {
 
   void parameters(ParameterVisitor& visit) {
     visit.flag("endpoint_matching", endpoint_matching,
-               "look up both ends of the ray and take the linear trend out of each march");
+               "look up both ends of the ray and remove the linear trend from each march");
     visit.choice("control", control, {"majorant", "majorant_minorant"},
-                 "optical thickness that sets the length of a march: the majorant's, or that less the minorant's");
+                 "optical thickness that sets the length of a march: of the majorant, or of majorant minus minorant");
   }
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }

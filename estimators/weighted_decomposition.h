@@ -17,7 +17,7 @@ namespace nullmark {
 template <class Value>
 struct WeightedDecompositionTracking {
   static constexpr const char* kName = "weighted_decomposition";
-  static constexpr const char* kSummary = "decomposition tracking with weights, under any controls and rates";
+  static constexpr const char* kSummary = "weighted decomposition tracking, for any controls and rates";
   static constexpr const char* kSource = "Kutz, Habel, Li, Novak 2017, Sec. 4.2";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
@@ -28,7 +28,7 @@ struct WeightedDecompositionTracking {
 
   void parameters(ParameterVisitor& visit) {
     visit.choice("control", control, {"minimum", "average", "middle", "maximum", "medium_average", "given"},
-                 "control extinction: of the segment's bounds, of the medium, or given");
+                 "control extinction: from the segment's bounds, the medium, or given");
     visit.numbers("controls", controls, 0, 16, Range::non_negative(), "1/length", "constant control extinctions (given)");
   }
 

@@ -13,7 +13,7 @@ namespace nullmark {
 template <class Value>
 struct WeightedDeltaTracking {
   static constexpr const char* kName = "weighted_delta";
-  static constexpr const char* kSummary = "weighted delta tracking: delta tracking under any rate, with signed weights";
+  static constexpr const char* kSummary = "weighted delta tracking: delta tracking at any rate, with signed weights";
   static constexpr const char* kSource = "Carter, Cashwell, Taylor 1972; Kutz et al. 2017, Sec. 3";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;

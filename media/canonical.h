@@ -67,7 +67,7 @@ class CanonicalMedium final : public Medium {
 
 struct CanonicalMediumSource final : MediumSource {
   static constexpr const char* kName = "canonical";
-  static constexpr const char* kSummary = "a profile along z whose rays' transmittance or extinction changes along x";
+  static constexpr const char* kSummary = "a profile along z; the transmittance or extinction of its rays changes along x";
   static constexpr const char* kSource = "Novak et al. 2014 and Georgiev et al. 2019, canonical maps";
 
   std::string profile = "cosine", ramp = "transmittance";

@@ -13,7 +13,7 @@ namespace nullmark {
 /// cells would bound each by its neighbours as well.
 struct Checkerboard {
   static constexpr const char* kName = "checkerboard";
-  static constexpr const char* kSummary = "cells of two extinctions in turn in three dimensions";
+  static constexpr const char* kSummary = "cells with two alternating extinctions in three dimensions";
   static constexpr const char* kSource = "a test field of this project";
 
   std::array<int, 3> cells = {8, 8, 8};

@@ -32,7 +32,7 @@ struct FractalNoise {
   Vec3 lo = Vec3::Zero(), hi = Vec3::Ones();
 
   void parameters(ParameterVisitor& visit) {
-    visit.number("peak", peak, Range::non_negative(), "1/length", "bound on the extinction, reached nowhere");
+    visit.number("peak", peak, Range::non_negative(), "1/length", "upper bound on the extinction, never reached");
     visit.integer("frequency", frequency, 1, 256, "cells of the coarsest octave across each side of the box");
     visit.integer("octaves", octaves, 1, 9, "octaves, each with twice the frequency of the one before");
     visit.number("gain", gain, Range::between(0, 1), "", "weight of an octave relative to the one before");

@@ -16,7 +16,7 @@ struct GaussianHoleProfile {
 
   void parameters(ParameterVisitor& visit) {
     visit.number("level", level, Range::non_negative(), "1/length", "extinction far from the hole");
-    visit.number("depth", depth, Range::non_negative(), "1/length", "what is missing at the centre, at most level");
+    visit.number("depth", depth, Range::non_negative(), "1/length", "reduction of the extinction at the centre, at most level");
     bell.parameters(visit);
   }
 

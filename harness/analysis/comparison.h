@@ -9,53 +9,53 @@
 
 namespace nullmark {
 
-/// Relative errors that times are told for.
+/// Relative errors for which times are computed.
 inline constexpr Real kTargets[] = {0.01, 0.001};
 
-/// A cell among those it is compared with.
+/// A cell in a comparison.
 struct RankedCell {
-  std::size_t run = 0;  ///< of the results, and the cell's place in them
+  std::size_t run = 0;  ///< index of the results that hold the cell
   const CellRecord* record = nullptr;
-  std::string label;  ///< the tracker, with what else tells it from others of the scene
+  std::string label;  ///< the tracker, with whatever distinguishes it from others of the scene
   std::optional<Cost> cost;
   std::vector<std::optional<Interval>> seconds;  ///< to each of kTargets
-  std::vector<bool> amortised;                   ///< the same: see is_amortised
-  /// 1 + those proven faster to the first target: the 95 % interval of the ratio of times lies above 1.  Equal ranks are ties.
-  /// Absent where no time is known or the target is out of reach.
+  std::vector<bool> amortised;                   ///< for each of kTargets: see is_amortised
+  /// 1 + number of cells proven faster to the first target, that is with a 95 % interval of the ratio of times above 1.  Equal
+  /// ranks are ties.  Absent if no time is known or the target is out of reach.
   std::optional<std::size_t> rank;
-  bool tied = false;                    ///< another one has the same rank
-  bool pareto = false;                  ///< none has less variance and less time a sample
-  std::optional<Interval> relative;     ///< seconds to the first target over those of the baseline
-  std::optional<BreakEven> break_even;  ///< of those with a floor, against Scene::best_unbiased
+  bool tied = false;                    ///< another cell has the same rank
+  bool pareto = false;                  ///< no other cell has less variance and less time per sample
+  std::optional<Interval> relative;     ///< seconds to the first target divided by those of the baseline
+  std::optional<BreakEven> break_even;  ///< for cells with a floor, against Comparison::best_unbiased
 };
 
-/// Mean squared errors of one sample of two trackers on the same random streams: the ratio's interval by a jackknife over the 16
-/// parts that go together, and by the same jackknife of either side alone.
+/// Ratio of the mean squared errors of one sample of two trackers on the same random streams.  `ratio` has an interval from a
+/// jackknife over 16 paired parts, `unpaired` from the same jackknife of each side alone.
 struct Pairing {
   std::size_t ranked = 0, against = 0;
   Interval ratio, unpaired;
-  std::uint64_t samples = 0;             ///< of a ray in the run
-  std::optional<Interval> of_the_means;  ///< the ratio at so many samples, where either has a floor and both costs are known
+  std::uint64_t samples = 0;             ///< per ray in the run
+  std::optional<Interval> of_the_means;  ///< the ratio at this many samples, if either has a floor and both costs are known
 };
 
-/// A ranked that has no Pairing with the baseline, and why.
+/// A cell without a Pairing with the baseline, and the reason.
 struct Unpaired {
   std::size_t ranked = 0;
   std::string reason;
 };
 
-/// Cells that differ in nothing but the tracker (its precision and seed included), by time to the first target.
+/// Cells that differ only in the tracker (including its precision and seed), sorted by time to the first target.
 struct Comparison {
   std::string name, quantity, medium, majorant, rays, light, measurement;
   std::vector<RankedCell> cells;             ///< by rank, then by time; those without a rank last
-  std::optional<std::size_t> baseline;       ///< the first that is unbiased, or the one asked for
-  std::optional<std::size_t> best_unbiased;  ///< least variance x time among those that claim to be unbiased and vary
-  std::vector<Pairing> pairings;             ///< of all others with the baseline, where their streams are the same
-  std::vector<Unpaired> unpaired;            ///< those others whose streams are not, or whose errors are not known
+  std::optional<std::size_t> baseline;       ///< the first that claims to be unbiased, or the requested one
+  std::optional<std::size_t> best_unbiased;  ///< least variance x time among cells that claim to be unbiased and have variance
+  std::vector<Pairing> pairings;             ///< of all other cells with the baseline, if they have the same streams
+  std::vector<Unpaired> unpaired;            ///< other cells with different streams or unknown errors
 };
 
 /// All comparisons of some results, in the order of their first cells.  `baseline` is a tracker's type or label, or empty. Throws
-/// InputError when it names none of the results.
+/// InputError if the results hold no such tracker.
 std::vector<Comparison> comparisons(const std::vector<RunRecord>& runs, const std::string& baseline);
 
 }  // namespace nullmark

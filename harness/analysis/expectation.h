@@ -11,7 +11,7 @@ namespace nullmark {
 using CellsByName = std::map<std::string, const CellRecord*>;
 CellsByName cells_by_name(const RunRecord& run);
 
-/// A table's metric of one cell, over that of the cell which the row is relative to; nothing where either is unknown.  `value` is
+/// A table's metric of one cell, divided by that of the row's `relative_to` cell; nothing if either is unknown.  `value` is
 /// `metric` or `metric_theory`.
 template <class F>
 std::optional<Real> row_value(const CellsByName& cells, const Table& table, const TableRow& row, const std::string& name,
@@ -24,7 +24,7 @@ std::optional<Real> row_value(const CellsByName& cells, const Table& table, cons
   return unit && *unit != 0 ? std::optional(*own / *unit) : std::nullopt;
 }
 
-/// A number that the configuration expects of a cell: the first given one of a table's row with a tolerance.
+/// A number that the configuration expects of a cell: the first given number of a table row with a tolerance.
 struct Expectation {
   std::string name;  ///< table, row and column
   Real given = 0, tolerance = 0;

@@ -14,18 +14,18 @@ namespace nullmark {
 /// The numeric parameters of a cell's estimator, medium, majorant and rays ("medium.optical_depth"), and "channels".
 std::map<std::string, Real> numeric_parameters(const CellRecord& record);
 
-/// Exponent p of y ~ x^p by least squares of logarithms, with the 95 % interval that the scatter around the line gives.  Nothing
-/// for fewer than three points or two different x; x and y must be above 0.
+/// Exponent p of y ~ x^p by least squares of logarithms, with a 95 % interval from the scatter around the line.  Nothing for
+/// fewer than three points or two different x.  x and y must be above 0.
 std::optional<Interval> power_law(const std::vector<std::pair<Real, Real>>& points);
 
-/// Cells that differ in one parameter alone.
+/// Cells that differ only in one parameter.
 struct ScalingSeries {
   std::string axis;                       ///< the parameter
-  std::string tracker, rest;              ///< the tracker, and all that is the same
+  std::string tracker, rest;              ///< the tracker, and everything else that the cells share
   std::vector<const CellRecord*> cells;   ///< by ascending parameter, three or more
   std::vector<Real> x;                    ///< the parameter, > 0
   std::optional<Interval> time, lookups;  ///< exponents of ns per sample and of lookups per sample
-  std::optional<Interval> time_upper;     ///< the same over the upper half of the points, where three are there
+  std::optional<Interval> time_upper;     ///< the same over the upper half of the points, if it has three
 };
 
 /// All such series of a run's sampled cells.

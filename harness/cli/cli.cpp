@@ -137,19 +137,21 @@ class CommandLine {
 
   void add_run() {
     CLI::App* command = add("run", "Run configurations and write their results", [this] { return run_command(run_); });
-    command->add_option("CONFIG", run_.configs, "Configuration files, folders of them, or - for standard input")->required();
+    command->add_option("CONFIG", run_.configs, "Configuration files, folders of configurations, or - for standard input")
+        ->required();
     command->add_option("-o,--output", run_.output,
-                        "Results file (default: CONFIG's stem + .results.json); - for standard output");
-    command->add_option("--threads", run_.threads, "Threads; 0: all cores.  Results do not depend on it")
+                        "Results file (default: stem of CONFIG + .results.json); - for standard output");
+    command->add_option("--threads", run_.threads, "Number of threads; 0: all cores.  Results do not depend on it")
         ->check(CLI::Range(0, 4096));
-    command->add_option("--seed", run_.seed, "Seed in place of the configuration's, or \"random\"");
-    command->add_option("--filter", run_.filter, "Only cells whose name matches this regular expression");
-    command->add_flag("--covering", run_.covering, "Only a part that meets every pair of estimator, medium, depth and majorant");
-    command->add_option("--shard", run_.shard, "Only part K of N: K/N");
-    command->add_flag("--resume", run_.resume, "Go on from the results and the journal that are there");
-    command->add_flag("--force", run_.force, "Replace results that are there")->excludes("--resume");
-    command->add_flag("--dry-run", run_.dry_run, "Print cells, predicted samples, lookups and time; sample nothing");
-    command->add_option("--time-budget", run_.time_budget, "Seconds after which no further cell is started")
+    command->add_option("--seed", run_.seed, "Seed that replaces that of the configuration, or \"random\"");
+    command->add_option("--filter", run_.filter, "Run only cells whose name matches this regular expression");
+    command->add_flag("--covering", run_.covering,
+                      "Run a subset in which every pair of estimator, medium, depth and majorant occurs");
+    command->add_option("--shard", run_.shard, "Run only part K of N: K/N");
+    command->add_flag("--resume", run_.resume, "Continue from the existing results and journal");
+    command->add_flag("--force", run_.force, "Replace existing results")->excludes("--resume");
+    command->add_flag("--dry-run", run_.dry_run, "Print cells, predicted samples, lookups and time; draw no samples");
+    command->add_option("--time-budget", run_.time_budget, "Start no further cell after this many seconds")
         ->check(CLI::Validator(
             [](const std::string& text) {
               double seconds = -1;
@@ -157,23 +159,23 @@ class CommandLine {
               return number ? std::string() : fmt::format("found \"{}\"; expected seconds >= 0", text);
             },
             "SECONDS"));
-    command->add_flag("--no-timing", run_.no_timing, "Statistics only");
+    command->add_flag("--no-timing", run_.no_timing, "Skip timing; statistics only");
   }
 
   void add_replay() {
-    CLI::App* command = add("replay", "Draw one sample of a cell again: every random number, lookup and weight",
+    CLI::App* command = add("replay", "Draw one sample of a cell again and print every random number, lookup and weight",
                             [this] { return replay_command(replay_); });
     command->add_option("RESULTS", replay_.results, "Results file")->required();
-    command->add_option("CELL", replay_.cell, "Name of a cell in it")->required();
+    command->add_option("CELL", replay_.cell, "Name of a cell in the results")->required();
     CLI::Option* ray =
-        command->add_option("--ray", replay_.ray, "Ray, from 0 (default: of the sample farthest from its ray's target)");
+        command->add_option("--ray", replay_.ray, "Ray, from 0 (default: that of the sample farthest from its target)");
     command->add_option("--sample", replay_.sample, "Sample of the ray, from 0 (default: the one farthest from its target)")
         ->needs(ray);
-    command->add_flag("--json", replay_.json, "As JSON, with all digits");
+    command->add_flag("--json", replay_.json, "Print JSON, with all digits");
   }
 
   void add_check() {
-    CLI::App* command = add("check", "Verdicts on bias and expected lookups, derived from the results file alone", [this] {
+    CLI::App* command = add("check", "Print verdicts on bias and expected lookups, derived from the results file alone", [this] {
       refuse_overwriting({file_}, {junit_, markdown_});
       RunRecord run = load_all({file_})[0];
       const Summary summary = summarise(run, strict_);
@@ -188,10 +190,10 @@ class CommandLine {
       return summary.exit;
     });
     command->add_option("RESULTS", file_, "Results file")->required();
-    command->add_flag(
-        "--cases", cases_,
-        "Also show per experiment and tracker what was finite, the largest sample, the worst error, the guards that fired");
-    command->add_flag("--strict", strict_, "Exit code 77 where any cell that claims something is not decided");
+    command->add_flag("--cases", cases_,
+                      "Also show for each experiment and tracker if all samples were finite, the largest sample, worst error, "
+                      "guards that fired");
+    command->add_flag("--strict", strict_, "Exit with code 77 if any cell that claims something is not decided");
     command->add_option("--junit", junit_, "Also write a JUnit report");
     command->add_option("--markdown", markdown_, "Also write a summary for a pull request");
   }
@@ -217,16 +219,17 @@ class CommandLine {
   }
 
   void add_gate() {
-    CLI::App* command = add("gate", "Compare what cells cost with a baseline; exit code 4 where a regression is proven",
+    CLI::App* command = add("gate", "Compare the cost of cells with a baseline; exit code 4 if a regression is proven",
                             [this] { return gate_command(gate_); });
     command->add_option("--baseline", gate_.baseline, "Results, a baseline, or a folder of baselines")->required();
     command->add_option("RESULTS", gate_.results, "Results file")->required();
     command
         ->add_option("--threshold", gate_.threshold,
-                     "Percent that a change must exceed, in place of the tiers' own: 0, 1, .2 to 1 (by history), 5")
+                     "Percent that a change must exceed; defaults of tiers 1 to 4: 0, 1, .2 to 1 (by history), 5")
         ->check(CLI::Range(0., 1000.));
-    CLI::Option* blocks = command->add_option("--blocks", gate_.blocks, "Folder of scripts/compare-builds: wall time as well");
-    command->add_flag("--quiet-machine", gate_.quiet_machine, "Slower wall time is a regression, not only a remark")
+    CLI::Option* blocks =
+        command->add_option("--blocks", gate_.blocks, "Folder of scripts/compare-builds: compare wall time as well");
+    command->add_flag("--quiet-machine", gate_.quiet_machine, "Count a slower wall time as a regression, not only as a remark")
         ->needs(blocks);
     command->add_flag("--update", gate_.update, "Make the results the baseline")->excludes(blocks);
     command->add_option("--junit", gate_.junit, "Also write a JUnit report");
@@ -237,21 +240,21 @@ class CommandLine {
     CLI::App* command =
         add("report", "Write one self-contained page with tables and plots", [this] { return report_command(report_); });
     command->add_option("RESULTS", report_.results, "Results files")->required();
-    command->add_option("-o,--output", report_.output, "HTML file to write; one that is there is replaced")->required();
+    command->add_option("-o,--output", report_.output, "HTML file to write; replaces an existing file")->required();
     command->add_option("--baseline", report_.baseline, "Estimator to compare the others with");
     command->add_option("--figures", report_.figures, "Folder for the main plots as PNG and SVG; needs Chromium");
     command->add_option("--markdown", report_.markdown, "Also write the rankings for a pull request");
   }
 
   void add_list() {
-    CLI::App* command = add("list", "List what configurations may name, with parameters and sources", [this] {
+    CLI::App* command = add("list", "List the names that configurations may use, with parameters and sources", [this] {
       const std::vector<std::string> lists = {"estimators", "media", "majorants", "rays", "quantities"};
       if (list_.what.empty()) throw InputError(fmt::format("list what? expected one of {}", fmt::join(lists, ", ")));
       expect_one_of(list_.what, lists, "list");
       return list_command(list_);
     });
     command->add_option("WHAT", list_.what, "estimators, media, majorants, rays or quantities");
-    command->add_flag("--json", list_.json, "As JSON");
+    command->add_flag("--json", list_.json, "Print JSON");
   }
 
   void add_schema() {
@@ -274,7 +277,7 @@ class CommandLine {
     });
     command->add_option("RESULTS", file_, "Results file")->required();
     command->add_option("--format", format_, "google-benchmark, csv, jsonl or junit")->required();
-    command->add_option("-o,--output", output_, "File; default standard output");
+    command->add_option("-o,--output", output_, "Output file (default: standard output)");
   }
 
   void add_merge() {
@@ -285,9 +288,9 @@ class CommandLine {
       deliver(results_text(merge_results(load_all(files_), files_)), output_);
       return ExitCode::ok;
     });
-    command->add_option("PART", files_, "Results files of one configuration")->required();
+    command->add_option("PART", files_, "Results files of the shards of one configuration")->required();
     command->add_option("-o,--output", output_, "Results file; - for standard output")->required();
-    command->add_flag("--force", force_, "Replace results that are there");
+    command->add_flag("--force", force_, "Replace existing results");
   }
 
   void add_make_volume() {
@@ -296,11 +299,11 @@ class CommandLine {
       write_procedural_vdb(file_, volume_);
       return ExitCode::ok;
     });
-    command->add_option("FILE", file_, "Path to write")->required();
-    command->add_option("--seed", volume_.seed, "Of the noise");
-    command->add_option("--resolution", volume_.resolution, "Voxels across");
+    command->add_option("FILE", file_, "File to write")->required();
+    command->add_option("--seed", volume_.seed, "Seed of the noise");
+    command->add_option("--resolution", volume_.resolution, "Voxels across the box");
     command->add_flag("--half", volume_.half, "Store 16-bit values");
-    command->add_flag("--force", force_, "Replace a file that is there");
+    command->add_flag("--force", force_, "Replace an existing file");
   }
 
   CLI::App app_{"Benchmark and validation harness for null-collision trackers", "nullmark"};
@@ -320,8 +323,7 @@ class CommandLine {
 template <class Entry>
 void refuse_shared_names(const char* what) {
   const std::string& name = Registry<Entry>::instance().taken_twice();
-  if (!name.empty())
-    throw InputError(fmt::format("two {} are registered as \"{}\"; give the plug-in's another name", what, name));
+  if (!name.empty()) throw InputError(fmt::format("two {} are registered as \"{}\"; rename that of the plug-in", what, name));
 }
 
 ExitCode guarded(int argc, char** argv) {
@@ -337,7 +339,7 @@ ExitCode guarded(int argc, char** argv) {
   } catch (const ParameterError& error) {
     return report(ExitCode::input_error, (error.parameter.empty() ? "" : error.parameter + ": ") + error.what());
   } catch (const std::bad_alloc&) {
-    return report(ExitCode::input_error, "not enough memory for what is asked; use fewer rays, cells or grid cells");
+    return report(ExitCode::input_error, "not enough memory; use fewer rays, cells or grid cells");
   } catch (const std::system_error& error) {
     // Of fmt, where the terminal's or the pipe's end is a full disk.
     return report(ExitCode::internal_error, error.what());

@@ -174,7 +174,7 @@ TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
       {"run nowhere.json", "nowhere.json: no such file"},
       {"check folder", "folder: is a folder"},
       {"check c.json", "c.json: is a configuration; `nullmark run` it first"},
-      {"run r.json", "r.json: these are results; nullmark check, compare and report read them"},
+      {"run r.json", "r.json: is a results file; nullmark check, compare and report read it"},
       {"check other.json", "is no results file of nullmark"},
       {"check page.html", "is no results file of nullmark"},
       {"check cut.json", "ends in the middle"},
@@ -187,7 +187,7 @@ TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
       {"export r.json --format cvs", "did you mean \"csv\"?"},
       {"compare r.json --baseline nosuch", "they have delta, ratio, residual_ratio"},
       {"report r.json -o r.html --figures c.json", "--figures: c.json: "},
-      {"report r.json -o r.html --figures c.json/x", "is no folder"}};
+      {"report r.json -o r.html --figures c.json/x", "is not a folder"}};
   for (const auto& [arguments, words] : cases) {
     EXPECT_EQ(run(arguments), code(ExitCode::input_error)) << arguments;
     const std::string error = read("err");

@@ -11,10 +11,10 @@ namespace nullmark {
 /// `nullmark run`.
 struct RunCommand {
   std::vector<std::string> configs;
-  std::string output;     ///< empty: by the configuration's name; "-": standard output
-  std::string seed;       ///< empty: the configuration's; "random"; or a number
+  std::string output;     ///< empty: from the name of the configuration; "-": standard output
+  std::string seed;       ///< empty: that of the configuration; "random"; or a number
   std::string filter;     ///< regular expression on cell names
-  bool covering = false;  ///< only cells that are covering_cells
+  bool covering = false;  ///< only the cells that covering_cells selects
   std::string shard;      ///< "K/N", 1 <= K <= N
   int threads = 0;
   std::optional<double> time_budget;
@@ -26,7 +26,7 @@ ExitCode run_command(const RunCommand& command);
 /// `nullmark replay`.
 struct ReplayCommand {
   std::string results, cell;
-  std::string ray, sample;  ///< whole numbers; empty: to be searched for
+  std::string ray, sample;  ///< whole numbers; empty: search
   bool json = false;
 };
 ExitCode replay_command(const ReplayCommand& command);
@@ -35,7 +35,7 @@ ExitCode replay_command(const ReplayCommand& command);
 struct GateCommand {
   std::string baseline;             ///< results, a baseline, or a folder of baselines
   std::string results;              ///< of `nullmark run`
-  std::optional<double> threshold;  ///< percent, in place of the tiers' own
+  std::optional<double> threshold;  ///< percent; replaces the thresholds of the tiers
   std::string blocks;               ///< folder of interleaved runs; empty: no wall time
   std::string junit, markdown;      ///< files; empty: none
   bool update = false, quiet_machine = false;
@@ -46,7 +46,7 @@ ExitCode gate_command(const GateCommand& command);
 struct ReportCommand {
   std::vector<std::string> results;
   std::string output;             ///< the page
-  std::string baseline;           ///< tracker that others are compared with; empty: the fastest unbiased one
+  std::string baseline;           ///< tracker to compare the others with; empty: the fastest unbiased one
   std::string figures, markdown;  ///< folder and file; empty: none
 };
 ExitCode report_command(const ReportCommand& command);

@@ -74,8 +74,8 @@ void print_text(const Json& list) {
     if (entry.contains("claims")) {
       std::string claims;
       for (const auto& [quantity, claim] : entry["claims"].items())
-        claims += fmt::format("{}{} of {}", claims.empty() ? "" : ", ", plain(claim), quantity);
-      fmt::print("    {}; range: {}{}{}\n", claims, plain(entry["range"]),
+        claims += fmt::format("{}{}: {}", claims.empty() ? "" : ", ", quantity, plain(claim));
+      fmt::print("    {}; range of samples: {}{}{}\n", claims, plain(entry["range"]),
                  entry["needs_bound"].get<bool>() ? "; needs a majorant that bounds the extinction" : "",
                  entry["lanes"].get<bool>() ? "; runs in lanes, in double and in float" : "");
     }

@@ -149,8 +149,8 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
     all_known &= lookups.has_value();
   }
   fmt::print(
-      "{}\n{} cells, {:.4g} samples, {}{:.4g} lookups, about {:.3g} s of one core at {} ns per lookup, timing not counted; about "
-      "{:.4g} lookups with what the verdicts take\n",
+      "{}\n{} cells, {:.4g} samples, {}{:.4g} lookups, about {:.3g} s of one core at {} ns per lookup, without timing; about "
+      "{:.4g} lookups including further samples of verdicts\n",
       aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
       total_lookups * kNsPerLookup * 1e-9, kNsPerLookup, lookups_to_decide);
   if (any) return ExitCode::ok;

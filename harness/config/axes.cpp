@@ -94,7 +94,7 @@ Axis samples_axis() {
 
 Axis equal_lookups_axis() {
   Axis lookups = axis(
-      "equal_lookups", described(positive_schema(), "samples_per_ray = this over the expected lookups per sample"),
+      "equal_lookups", described(positive_schema(), "samples_per_ray = this / (expected lookups per sample)"),
       [](const JsonNode& node) { return node.positive(); }, [](auto& c) -> auto& { return c.cell.equal_lookups; });
   lookups.read = [read = lookups.read](const JsonNode& node) {
     return setters(read(node), [](ConfiguredCell& c, const Setter& set) {
@@ -144,8 +144,8 @@ const std::vector<Axis>& axes() {
       axis(
           "transport", transport_schema(), read_transport, [](auto& c) -> auto& { return c.cell.transport; }),
       axis(
-          "precision", described({{"enum", precision_names()}}, "numbers that walks are made of; \"double\" where left out"),
-          read_enum<Precision>, [](auto& c) -> auto& { return c.cell.precision; })};
+          "precision", described({{"enum", precision_names()}}, "precision of walks; default: \"double\""), read_enum<Precision>,
+          [](auto& c) -> auto& { return c.cell.precision; })};
   return kAxes;
 }
 
@@ -164,9 +164,9 @@ const std::vector<SharedKey>& shared_keys() {
       shared<bool>("images", "", flag, {{"type", "boolean"}, {"default", false}},
                    [](Cell& cell, bool value) { cell.images = value; }),
       shared<Real>(
-          "image_maximum", "value shown white", [](const JsonNode& node) { return node.positive(); }, positive_schema(),
+          "image_maximum", "value shown as white", [](const JsonNode& node) { return node.positive(); }, positive_schema(),
           [](Cell& cell, Real value) { cell.image_maximum = value; }),
-      shared<bool>("own_streams", "random streams keyed by the estimator too, instead of common random numbers", flag,
+      shared<bool>("own_streams", "random streams depend on the estimator, instead of common random numbers", flag,
                    {{"type", "boolean"}, {"default", false}}, [](Cell& cell, bool value) { cell.own_streams = value; }),
       shared<VerdictSpec>(
           "verdict", "what the verdict must prove and may cost",

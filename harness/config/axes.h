@@ -10,9 +10,9 @@
 
 namespace nullmark {
 
-/// A cell while its experiment is expanded: specifications in place of indices.
+/// A cell during the expansion of its experiment: it holds specifications instead of indices.
 struct ConfiguredCell {
-  std::string experiment;  ///< as the file calls it
+  std::string experiment;  ///< its name in the file
   std::optional<Component> estimator, rays;
   std::optional<MediumSpec> medium;
   std::optional<Component> majorant;
@@ -23,10 +23,10 @@ struct ConfiguredCell {
 /// Gives a cell one value of a key.
 using Setter = std::function<void(ConfiguredCell&)>;
 
-/// Whether a pattern, a partial cell, fits a cell.
+/// Whether a cell matches a pattern.
 using Test = std::function<bool(const ConfiguredCell&)>;
 
-/// A key by which the cells of an experiment differ.
+/// A key in which the cells of an experiment can differ.
 struct Axis {
   std::string name;
   std::function<std::vector<Setter>(const JsonNode&)> read;                 ///< the values that a file lists

@@ -45,9 +45,9 @@ void CellPatterns::matches_none(const JsonNode& node, const char* expected) cons
     Json alone = {{key, value}};
     if (node.has("experiment")) alone["experiment"] = node.json().at("experiment");
     if (matching(JsonNode(alone, node.file(), node.pointer())).empty())
-      node.fail(fmt::format("matches no cell; expected {}, and there is none of this \"{}\"", expected, key));
+      node.fail(fmt::format("matches no cell; expected {}, and no cell has this \"{}\"", expected, key));
   }
-  node.fail(fmt::format("matches no cell; expected {}, but its keys are those of different cells", expected));
+  node.fail(fmt::format("matches no cell; expected {}, but its keys match different cells", expected));
 }
 
 std::string CellPatterns::one(const JsonNode& node) const {
@@ -99,7 +99,7 @@ std::vector<std::string> CellPatterns::counterparts(const JsonNode& of, const Js
   if (candidates.empty()) matches_none(node, "a counterpart for each of \"cells\"");
   std::vector<std::string> names;
   for (const JsonNode& entry : of.elements_or_self()) {
-    if (entry.has("cell")) node.fail("cells that are named need counterparts that are named: a list of {\"cell\": name}");
+    if (entry.has("cell")) node.fail("named cells need named counterparts: a list of {\"cell\": name}");
     for (const std::size_t configured : matching(entry)) {
       std::vector<std::size_t> found;
       for (const std::size_t candidate : candidates) {
@@ -110,10 +110,8 @@ std::vector<std::string> CellPatterns::counterparts(const JsonNode& of, const Js
         if (same && std::all_of(axes().begin(), axes().end(), agree)) found.push_back(candidate);
       }
       if (found.empty())
-        node.fail(
-            fmt::format("finds no counterpart of \"{}\"; expected one that differs from it in what this pattern names, and in "
-                        "nothing else",
-                        described(configured)));
+        node.fail(fmt::format("finds no counterpart of \"{}\"; expected one that differs from it only in what this pattern names",
+                              described(configured)));
       // Of several, those that are as the cell itself in what the pattern leaves open.
       std::vector<std::size_t> alike = found;
       if (found.size() > 1 && node.has("estimator"))

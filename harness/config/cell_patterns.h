@@ -14,16 +14,16 @@ namespace nullmark {
 /// {"cell": name}.
 class CellPatterns : public CellReader {
  public:
-  /// Of a configuration file: `cells` are its cells, which in the plan begin at `first`; `experiments` are the file's own names.
+  /// `cells` are the cells of one configuration file; in the plan they begin at `first`.  `experiments` are the file's own names.
   CellPatterns(const Plan& plan, std::size_t first, std::span<const ConfiguredCell> cells, std::vector<std::string> experiments);
 
   std::string one(const JsonNode& node) const override;
 
   std::vector<std::string> all(const JsonNode& node) const override;
 
-  /// For each cell that `of` finds, the one that fits the pattern `node` and agrees with it on all axes that the pattern does
-  /// not name (experiments count as one); of several, the one whose estimator differs in no parameter but those named.  Throws
-  /// InputError where there is not exactly one.
+  /// For each cell that `of` finds: the cell that matches the pattern `node` and agrees with it on all axes that the pattern does
+  /// not name (the experiment counts as an axis).  Of several, the one whose estimator differs only in named parameters.  Throws
+  /// InputError if there is not exactly one.
   std::vector<std::string> counterparts(const JsonNode& of, const JsonNode& node) const override;
 
   bool is_judged(const std::string& name) const override;
@@ -39,7 +39,7 @@ class CellPatterns : public CellReader {
   std::size_t first_;
   std::span<const ConfiguredCell> cells_;
   std::vector<std::string> experiments_;
-  std::map<std::string, bool> judged_;  ///< whether the plan's cell of a name gets a verdict
+  std::map<std::string, bool> judged_;  ///< by cell name: whether it gets a verdict
 };
 
 }  // namespace nullmark

@@ -8,15 +8,16 @@
 
 namespace nullmark {
 
-/// Throws InputError where a x b combinations are more than a plan may have: a few lists in a small file could fill any memory.
+/// Throws InputError if a x b combinations are more than a plan may have.  Otherwise a few lists in a small file could fill
+/// memory.
 void expect_cells(const JsonNode& node, std::size_t a, std::size_t b);
 
-/// The components that a configuration's entry stands for, complete with defaults and labels: "ratio", {"type": "ratio"}, or with
-/// lists in place of single parameter values, all combinations of them, the first key varying slowest.
+/// The components of an entry such as "ratio" or {"type": "ratio"}, with defaults and labels.  If parameters are lists, returns
+/// all combinations, the first key varying slowest.
 std::vector<Component> read_components(ComponentKind kind, const JsonNode& node);
 std::vector<MediumSpec> read_media(const JsonNode& node);
 
-/// Partial specifications: type and the parameters that are given, nothing else.  A list stands for any of its entries.
+/// Patterns: the type and the given parameters only.  A list matches any of its entries.
 std::vector<Component> read_component_patterns(ComponentKind kind, const JsonNode& node);
 std::vector<MediumSpec> read_medium_patterns(const JsonNode& node);
 bool matches(const Component& pattern, const Component& component);

@@ -89,7 +89,7 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
   const Json& json = plan.json;
   const JsonNode top(json, source.file);
   if (json.is_object() && json.contains("cells"))
-    throw InputError(source.file + ": these are results; nullmark check, compare and report read them");
+    throw InputError(source.file + ": is a results file; nullmark check, compare and report read it");
   top.expect_object();
   if (json.contains("$schema") && json["$schema"] == "nullmark/config/1")
     top["$schema"].fail(fmt::format(

@@ -235,7 +235,7 @@ TEST(Config, SelectorsMatchExactlyOneCell) {
       "t.json: /tables/0/rows/0/cells/c: matches 2 cells, among them \"e: ratio/linear/global\" and \"e: delta/linear/global\"; "
       "expected exactly one");
   EXPECT_EQ(error_of(with_selector(R"({"estimator":"residual_ratio"})")),
-            "t.json: /tables/0/rows/0/cells/c: matches no cell; expected exactly one, and there is none of this \"estimator\"");
+            "t.json: /tables/0/rows/0/cells/c: matches no cell; expected exactly one, and no cell has this \"estimator\"");
 }
 
 TEST(Config, CommentKeysAreIgnoredEverywhere) {

@@ -8,13 +8,13 @@
 
 namespace nullmark {
 
-/// A partial cell; all keys that are given must match.  Keys in `also` are someone else's.
+/// Reads a pattern: all its keys must match.  Keys in `also` are allowed and ignored.
 Test read_pattern(const JsonNode& node, const std::vector<std::string>& also = {});
 
-/// Throws InputError where a configuration has a key by the name it had in version 1.
+/// Throws InputError if a configuration uses the name that a key had in version 1.
 void refuse_renamed(const JsonNode& node, const char* before, const char* now);
 
-/// The cells of an experiment (format: config.md).  `seed` is that of cells that name none.
+/// The cells of an experiment (format: config.md).  Cells that name no seed get `seed`.
 std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t seed);
 
 }  // namespace nullmark

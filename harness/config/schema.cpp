@@ -53,7 +53,7 @@ void add_matter_schema(Json& properties) {
        {one_or_list_schema(number),
         closed_object({{"radiance", one_or_list_schema(number)}, {"field", described(reference("medium"), "scales it in space")}},
                       {"radiance"})}},
-      {"description", "radiance L_e: a ray gains mu_a L_e a length"}};
+      {"description", "radiance L_e: a ray gains mu_a L_e per unit length"}};
   properties["optional"] = {{"type", "boolean"}, {"default", false}};
 }
 
@@ -101,7 +101,7 @@ Json cell_definitions() {
   for (const SharedKey& key : shared_keys()) cell[key.name] = key.schema;
   Json experiment = cell;
   experiment["name"] = {{"type", "string"}, {"minLength", 1}};
-  experiment["matrix"] = described(closed_object(std::move(matrix)), "axes of which all combinations are cells");
+  experiment["matrix"] = described(closed_object(std::move(matrix)), "axes; every combination is a cell");
   experiment["zip"] = described(list_of(list_of({{"type", "string"}}, 1)), "axes that advance together");
   experiment["exclude"] = list_of(reference("pattern"));
   experiment["include"] = list_of(reference("cell"));
@@ -122,8 +122,8 @@ Json table_schema() {
        {"given", {{"type", "object"}, {"additionalProperties", {{"type", "number"}}}}},
        {"cells", {{"type", "object"}, {"additionalProperties", reference("selector")}}},
        {"theory", reference("selector")},
-       {"relative_to", described(reference("selector"), "whose metric divides the row's")},
-       {"tolerance", described(positive_schema(), "relative; check fails where a cell is farther from the first given number")},
+       {"relative_to", described(reference("selector"), "the row's metric is divided by that of this cell")},
+       {"tolerance", described(positive_schema(), "relative; check fails if a cell is farther from the first given number")},
        {"note", {{"type", "string"}}}},
       {"label"});
   return closed_object(
@@ -144,7 +144,7 @@ Json claim_schema() {
        {"at_most", compared},
        {"at_least", compared},
        {"unbiased", described({{"const", true}}, "the verdict of every cell is PASS")},
-       {"factor", described({{"type", "number"}}, "on what is compared with")},
+       {"factor", described({{"type", "number"}}, "multiplies what is compared with")},
        {"tolerance", described(positive_schema(), "relative, of \"near\"")},
        {"slope_against", described(metric, "compare the slope of log metric over the log of this one")}},
       {"cells"});

@@ -267,7 +267,7 @@ struct VerdictField {
 template <class Visit>
 void visit_cell(Visit& visit, CellRecord& record) {
   auto& cell = record.cell;
-  visit.required("id", cell.id, "hash of all that decides the statistics, 16 hexadecimal digits");
+  visit.required("id", cell.id, "hash of everything that determines the statistics, 16 hexadecimal digits");
   visit.required("name", cell.name);
   visit.required("experiment", cell.experiment);
   visit.part("estimator", [&](auto& inner) {
@@ -285,7 +285,7 @@ void visit_cell(Visit& visit, CellRecord& record) {
     visit_component(inner, record.majorant, ComponentKind::majorant, record.majorant.label);
     bool built = record.structure.has_value();
     StructureSize size = record.structure.value_or(StructureSize{});
-    inner.when("cells", built, size.cells, "regions with bounds of their own");
+    inner.when("cells", built, size.cells, "regions with their own bounds");
     inner.when("nodes", built, size.nodes, "of a tree, leaves included; 0: no tree");
     inner.when("bytes", built, size.bytes, "of memory");
     if constexpr (Visit::kReads)
@@ -297,7 +297,7 @@ void visit_cell(Visit& visit, CellRecord& record) {
   visit.part("measurement", [&](auto& inner) { visit_fields(inner, cell.measurement); });
   visit.lenient("transport", TransportField{cell.transport});
   visit.required("channels", WithinField{record.channels, 1, kMaxChannels});
-  visit.lenient("outputs", record.outputs, "what each entry of the statistics is, where not a channel");
+  visit.lenient("outputs", record.outputs, "names of the entries of the statistics, if they are not channels");
   visit.required("effects", record.effects);
   visit.required("rays", record.rays);
   visit.required("samples_per_ray", cell.samples_per_ray);
@@ -365,7 +365,7 @@ void visit_fields(Visit& visit, CellRecord& record) {
     inner.required("variance", RealsField{step.variance, outputs_of(record)}, "of means of so many samples");
   });
   visit.lenient("image_maximum", record.cell.image_maximum);
-  visit.sparse("instructions", record.instructions, "that drawing all samples took, counted in a simulator");
+  visit.sparse("instructions", record.instructions, "instructions of drawing all samples, counted in a simulator");
   visit.when("images", record.cell.images, record.images);
 }
 

@@ -81,8 +81,8 @@ ClaimPart read_part(const JsonNode& node, const CellReader& finder) {
   part.metric = node["metric"].one_of(metric_names(), "metric");
   const std::vector<std::string>& claimable = claimable_metric_names();
   if (std::find(claimable.begin(), claimable.end(), part.metric) == claimable.end())
-    node["metric"].fail(fmt::format("\"{}\" has no standard error, so that nothing could be told; expected one of {}",
-                                    part.metric, fmt::join(claimable, ", ")));
+    node["metric"].fail(fmt::format("\"{}\" has no standard error, so no claim can test it; expected one of {}", part.metric,
+                                    fmt::join(claimable, ", ")));
   if (node.has("tolerance") != (part.relation == Relation::near))
     node.fail("expected \"tolerance\" beside \"near\", and only there");
   read_compared_with(node, node[*relation], finder, part);

@@ -5,11 +5,11 @@
 
 namespace nullmark {
 
-/// The claims of a plan, cells by their names.
+/// The claims of a plan; cells are given by name.
 Json claims_json(const std::vector<PublishedClaim>& claims);
 
-/// Adds the claims of a configuration (format: config.md) or, with a finder that takes names as they are, of results, to those of
-/// other files.  Throws InputError.
+/// Adds the claims of a configuration (format: config.md), or of results, to those of other files.  `finder` resolves the cells.
+/// Throws InputError.
 void read_claims(const JsonNode& node, const CellReader& finder, std::vector<PublishedClaim>& claims);
 
 }  // namespace nullmark

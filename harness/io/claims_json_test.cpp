@@ -74,8 +74,8 @@ TEST(Claims, WhatIsWrongIsNamedWithItsPlace) {
   says(R"(,"metric":"variance","at_most":1,"tolerance":1)", "\"tolerance\" beside \"near\"");
   says(R"(,"metric":"variance","at_most":[1,2,3])", "found 3 to compare with; expected 2");
   says(R"(,"metric":"variance","at_most":{"estimator":["delta","residual_ratio"]})", "expected a pattern that tells them apart");
-  says(R"(,"metric":"variance","at_most":{"estimator":"weighted_delta"})", "there is none of this \"estimator\"");
-  says(R"(,"metric":"variance","at_most":{"estimator":"delta","precision":"float"})", "there is none of this \"precision\"");
+  says(R"(,"metric":"variance","at_most":{"estimator":"weighted_delta"})", "no cell has this \"estimator\"");
+  says(R"(,"metric":"variance","at_most":{"estimator":"delta","precision":"float"})", "no cell has this \"precision\"");
   says(R"(,"metric":"variance","at_most":{"experiment":"unjudged"})", "finds no counterpart of");
   says(R"(,"metric":"variance","at_most":{"estimator":"ratio"})", "would be compared with itself");
   says(R"(,"unbiased":true,"metric":"mean")", "does not apply");
@@ -93,7 +93,7 @@ TEST(Claims, WhatIsWrongIsNamedWithItsPlace) {
       error_of(claim(R"({"cells":{"experiment":"unjudged"},"unbiased":true})")).find("expected its \"verdict\" to be enabled"),
       std::string::npos);
   EXPECT_NE(error_of(claim(R"({"metric":"mean","cells":{"experiment":"f","medium":"cosine"},"at_most":1})"))
-                .find("none of this \"medium\""),
+                .find("no cell has this \"medium\""),
             std::string::npos);
   EXPECT_NE(error_of(claim(R"({"metric":"mean","cells":{"experiment":"g"},"at_most":1})")).find("unknown experiment"),
             std::string::npos);

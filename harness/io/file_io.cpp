@@ -26,8 +26,8 @@ namespace fs = std::filesystem;
 namespace {
 
 [[noreturn]] void fail(const std::string& path, const char* action) {
-  throw InputError(fmt::format("{}: cannot be {}: {}; give a path in a folder that is there and can be written", path, action,
-                               std::strerror(errno)));
+  throw InputError(
+      fmt::format("{}: cannot be {}: {}; give a path in an existing, writable folder", path, action, std::strerror(errno)));
 }
 
 constexpr const char* kTemporary = ".tmp";
@@ -63,9 +63,9 @@ std::string unpacked(const std::string& packed, const std::string& path) {
       if (text.size() > kMost) throw InputError(path + ": unpacks to more than 1 GiB; expected results of nullmark");
     }
   } catch (const io::gzip_error&) {
-    throw InputError(path + ": is packed by gzip, but damaged; copy it again");
+    throw InputError(path + ": is a damaged gzip file; copy it again");
   } catch (const std::ios_base::failure&) {
-    throw InputError(path + ": is packed by gzip, but damaged; copy it again");
+    throw InputError(path + ": is a damaged gzip file; copy it again");
   }
   return text;
 }
@@ -119,7 +119,7 @@ void expect_replaceable(const std::string& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (fs::exists(status) && !fs::is_regular_file(status))
-    throw InputError(path + ": is no regular file; expected the path of a file, or - for standard output");
+    throw InputError(path + ": is not a regular file; expected the path of a file, or - for standard output");
 }
 
 void remove_leftovers(const std::string& path) {

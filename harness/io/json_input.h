@@ -19,7 +19,7 @@ namespace nullmark {
 /// Keeps the order of keys.
 using Json = nlohmann::ordered_json;
 
-/// Something the user gave cannot be used: configuration, results file, journal, output path.  One line; exit code 2.
+/// Input from the user cannot be used: configuration, results file, journal, output path.  One line; exit code 2.
 struct InputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -31,14 +31,14 @@ Json parse_json(const std::string& text, const std::string& file);
 Json number_or_null(Real x);
 Json number_or_null(const std::optional<Real>& x);
 
-/// JSON that the program wrote itself; `is_discarded()` where it is none.
+/// Parses JSON that the program wrote itself; `is_discarded()` if it is not JSON.
 Json known_json(const std::string& text);
 
-/// The candidate fewest edits away from a misspelt word; empty where none is near.
+/// The candidate with the fewest edits from a misspelt word; empty if none is near.
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates);
 
-/// A value in a JSON document and where it stands; its getters throw InputError with file and JSON pointer where it is not what
-/// is asked for.
+/// A value in a JSON document and its location.  Its getters throw InputError with file and JSON pointer if the value has another
+/// type or range.
 class JsonNode {
  public:
   JsonNode(const Json& value, std::string file, std::string pointer = "")
@@ -47,7 +47,7 @@ class JsonNode {
   const Json& json() const { return *value_; }
   const std::string& file() const { return file_; }
   std::string pointer() const { return pointer_.empty() ? "/" : pointer_; }
-  /// "file: /pointer", as errors name it.
+  /// "file: /pointer", the location in error messages.
   std::string where() const { return file_ + ": " + pointer(); }
 
   bool has(const char* key) const { return value_->contains(key); }
@@ -55,16 +55,16 @@ class JsonNode {
   JsonNode operator[](std::size_t index) const;
   /// The elements of a list.
   std::vector<JsonNode> elements() const;
-  /// The list's elements, or the value itself where it is no list.
+  /// The elements of a list, or the value itself if it is not a list.
   std::vector<JsonNode> elements_or_self() const;
 
   void expect_object() const;
-  /// Also refuses every key that is neither allowed nor begins with "x-".
+  /// Refuses every key that is not allowed and does not begin with "x-".
   void expect_keys(const std::vector<std::string>& allowed) const;
 
   bool boolean() const;
   std::string string() const;
-  /// A string out of a list of names; `what` is how an error calls them: "unknown quantity".
+  /// A string from a list of names; errors call it `what`: "unknown quantity".
   std::string one_of(const std::vector<std::string>& names, const char* what) const;
   Real number() const;
   /// A finite number above 0.

@@ -40,11 +40,12 @@ void refuse_overwriting(const std::vector<std::string>& inputs, const std::vecto
     if (!is_file(outputs[i])) continue;
     for (const std::string& input : read)
       if (same_file(outputs[i], input))
-        throw InputError(fmt::format("{}: would be written over {}, which the command reads; give the output another path",
-                                     outputs[i], input));
+        throw InputError(
+            fmt::format("{}: would overwrite {}, which the command reads; give the output another path", outputs[i], input));
     for (std::size_t j = 0; j < i; ++j)
       if (is_file(outputs[j]) && same_file(outputs[i], outputs[j]))
-        throw InputError(fmt::format("{}: two outputs of the command would go there; give each a path of its own", outputs[i]));
+        throw InputError(
+            fmt::format("{}: two outputs of the command would be written to this file; give each its own path", outputs[i]));
   }
 }
 

@@ -5,8 +5,8 @@
 
 namespace nullmark {
 
-/// Throws InputError where an output of a command is one of its inputs or another of its outputs, by whatever name or link.  The
-/// *.json of folders among the inputs count; "" and "-" do not.
+/// Throws InputError if an output of a command is also one of its inputs or another of its outputs, by any name or link.  Folders
+/// among the inputs stand for their *.json files; "" and "-" are ignored.
 void refuse_overwriting(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
 
 }  // namespace nullmark

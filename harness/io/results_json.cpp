@@ -38,7 +38,7 @@ std::string statistics_text(const RunRecord& run) {
 }
 
 RunRecord read_results(const std::string& text, const std::string& file) {
-  const auto no_results = [&] { return InputError(file + ": is no results file of nullmark; `nullmark run` writes them"); };
+  const auto no_results = [&] { return InputError(file + ": is not a results file of nullmark; `nullmark run` writes them"); };
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first != std::string::npos && text[first] != '{') throw no_results();
   const Json json = parse_json(text, file);

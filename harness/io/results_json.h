@@ -7,24 +7,24 @@
 
 namespace nullmark {
 
-/// A cell as the results file holds it.  One channel: numbers; more: lists.  null for what is not known or not finite.
+/// The JSON of a cell in the results file.  Numbers for one channel, lists for more; null if unknown or not finite.
 Json cell_json(const CellRecord& record);
 
-/// The inverse: complete but for the cell's indices into its plan's lists, which are 0; the record holds what they referred to.
-/// Numbers come back bit for bit.  Throws InputError.
+/// The inverse, complete except for the indices into the plan's lists, which are 0; the record holds the specifications
+/// themselves.  Numbers are restored bit for bit.  Throws InputError.
 CellRecord read_cell(const JsonNode& node);
 
 /// JSON Schema of a cell in the results file.
 Json cell_schema();
 
-/// The results file, one cell a line.
+/// The text of a results file, one cell per line.
 std::string results_text(const RunRecord& run);
 
-/// Reads files of the same major schema number; keys it does not know are ignored.  Throws InputError.
+/// Reads files of the same major schema number; ignores unknown keys.  Throws InputError.
 RunRecord read_results(const std::string& text, const std::string& file);
 
-/// Everything that the seed decides, one cell a line: no time, no provenance, no file names.  Equal texts mean equal statistics
-/// to the last bit.
+/// Everything that the seed determines, one cell per line, without times, provenance and file names.  Equal texts mean
+/// bit-identical statistics.
 std::string statistics_text(const RunRecord& run);
 
 }  // namespace nullmark

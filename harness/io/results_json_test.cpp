@@ -129,7 +129,7 @@ TEST(ResultsJson, ErrorsAreOneLine) {
             "r.json: /nullmark: found \"results/3\"; expected \"results/2\", the version this program reads");
   EXPECT_EQ(error_of(R"({"nullmark_schema": 1, "name": "old"})"),
             "r.json: are results of version 1; this program reads \"nullmark\": \"results/2\": run their configuration again");
-  EXPECT_EQ(error_of("{}"), "r.json: is no results file of nullmark; `nullmark run` writes them");
+  EXPECT_EQ(error_of("{}"), "r.json: is not a results file of nullmark; `nullmark run` writes them");
   EXPECT_EQ(error_of(replaced(text, "\"status\":\"ok\"", "\"status\":\"okay\"")),
             "r.json: /cells/0/status: unknown status \"okay\"; expected one of \"ok\", \"skipped\", \"not_run\", \"error\"");
   EXPECT_EQ(error_of(replaced(text, "\"rays\":1,\"samples_per_ray\"", "\"rays\":-1,\"samples_per_ray\"")),

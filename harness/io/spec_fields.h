@@ -64,16 +64,15 @@ template <class Visit>
 void visit_fields(Visit& visit, VerdictSpec& spec) {
   constexpr std::int64_t kMost = std::int64_t{1} << 53;
   visit.lenient("enabled", spec.enabled);
-  visit.lenient("max_samples_per_ray", WithinField{spec.max_samples_per_ray, 0, kMost},
-                "drawn while the verdict is open; 0: samples_per_ray, and up to four times as many where the plan says that they "
-                "are enough");
-  visit.lenient("laws", spec.laws, "when the laws of walks are tested: undecided means only where the mean cannot decide");
-  visit.sparse("tolerate", spec.tolerate, "which bias is a FAIL: nothing means any that is proven, epsilon one beyond epsilon");
-  visit.sparse(
-      "samples", FlagWordField{spec.all_samples, sample_policies(), "policy"},
-      "what an undecided cell may draw: planned stops where the plan says that the allowance cannot decide it, all draws "
-      "the allowance all the same");
-  visit.sparse("epsilon", PositiveField{spec.epsilon}, "|bias| that PASS excludes, relative to the mean reference");
+  visit.lenient(
+      "max_samples_per_ray", WithinField{spec.max_samples_per_ray, 0, kMost},
+      "drawn while the verdict is open; 0: samples_per_ray, and up to four times as many if the plan says that they suffice");
+  visit.lenient("laws", spec.laws, "when the laws of walks are tested; undecided: only if the mean cannot be decided");
+  visit.sparse("tolerate", spec.tolerate, "nothing: any proven bias is a FAIL; epsilon: only a bias proven beyond epsilon is");
+  visit.sparse("samples", FlagWordField{spec.all_samples, sample_policies(), "policy"},
+               "planned: an undecided cell draws no more if the plan says that its allowance does not suffice; all: it draws its "
+               "whole allowance");
+  visit.sparse("epsilon", PositiveField{spec.epsilon}, "a PASS proves |bias| below this; relative to the mean reference");
   visit.sparse("max_lookups_per_ray", PositiveField{spec.max_lookups_per_ray},
                "expected lookups that all samples of a ray may cost");
 }
@@ -89,7 +88,7 @@ template <class Visit>
 void visit_fields(Visit& visit, TimingPlan& timing) {
   visit.lenient("enabled", timing.enabled);
   visit.lenient("repetitions", WithinField{timing.repetitions, 1, 10'000});
-  visit.lenient("seconds", PositiveField{timing.seconds}, "least time of one repetition");
+  visit.lenient("seconds", PositiveField{timing.seconds}, "minimum time of one repetition");
   visit.lenient("samples_per_traversal", BatchesField{timing.samples_per_traversal},
                 "samples that share one walk through the majorant structure; of an ascending list the last is what a cell's time "
                 "says");
@@ -98,7 +97,7 @@ void visit_fields(Visit& visit, TimingPlan& timing) {
 template <class Visit>
 void visit_fields(Visit& visit, ErrorRates& rates) {
   visit.lenient("alpha", LevelField{rates.alpha}, "chance of even one false FAIL in the whole configuration");
-  visit.lenient("alpha_pass", LevelField{rates.alpha_pass}, "chance of a false PASS, of each test");
+  visit.lenient("alpha_pass", LevelField{rates.alpha_pass}, "chance of a false PASS of one test");
 }
 
 }  // namespace nullmark

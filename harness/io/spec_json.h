@@ -11,14 +11,14 @@ namespace nullmark {
 /// The first key of a configuration.
 inline constexpr const char *kVersionKey = "nullmark", *kConfigVersion = "config/2";
 
-/// Parts of a plan as a configuration writes them, complete: every parameter stands there.
+/// Parts of a plan as JSON of a configuration, with every parameter.
 Json parameters_json(const ParameterValues& values);
 Json component_json(const Component& component);
 Json medium_json(const MediumSpec& medium);
-/// Adds what a medium does to light beside removing it: albedo, anisotropy, emission.
+/// Adds a medium's effects on light beside extinction: albedo, anisotropy, emission.
 void add_matter(Json& json, const MediumSpec& medium);
 
-/// What decides a cell's statistics, as canonical text, hashed to 16 hexadecimal digits.
+/// Hash of everything that determines a cell's statistics, as 16 hexadecimal digits of canonical text.
 std::string cell_id(const Plan& plan, const Cell& cell);
 
 /// The plan as a configuration that names every cell explicitly; reading it gives the same plan.  One line, canonical.

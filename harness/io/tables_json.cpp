@@ -44,8 +44,7 @@ TableRow read_row(const JsonNode& node, const CellReader& finder) {
   if (node.has("relative_to")) row.relative_to = finder.one(node["relative_to"]);
   if (node.has("tolerance")) {
     row.tolerance = node["tolerance"].positive();
-    if (row.given.empty() || row.cells.empty())
-      node["tolerance"].fail("needs \"given\" and \"cells\" beside it, which it compares");
+    if (row.given.empty() || row.cells.empty()) node["tolerance"].fail("needs \"given\" and \"cells\" beside it");
   }
   return row;
 }

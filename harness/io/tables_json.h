@@ -5,10 +5,10 @@
 
 namespace nullmark {
 
-/// The tables of a plan, cells by their names: {"cell": "ratio/linear/global"}.
+/// The tables of a plan; cells are given by name: {"cell": "ratio/linear/global"}.
 Json tables_json(const std::vector<Table>& tables);
 
-/// Tables of a configuration or, with a finder that takes names as they are, of results.  Throws InputError.
+/// Reads the tables of a configuration or of results.  `finder` resolves the cells.  Throws InputError.
 std::vector<Table> read_tables(const JsonNode& node, const CellReader& finder);
 
 }  // namespace nullmark

@@ -8,21 +8,21 @@
 
 namespace nullmark {
 
-/// Lines of equally many words as aligned columns, the first line being the heading; the first `left` columns and the last one
-/// are set flush left, the others flush right.
+/// Lines with the same number of words, as aligned columns; the first line is the heading.  The first `left` columns and the last
+/// one are left-aligned, the others right-aligned.
 std::string aligned(const std::vector<std::vector<std::string>>& lines, std::size_t left);
 
-/// The same as a table of markdown, and text for one of its cells.
+/// The same as a markdown table; escaped text for one of its cells.
 std::string markdown_table(const std::vector<std::vector<std::string>>& lines);
 std::string markdown_cell(const std::string& text);
 
-/// Four significant digits, "-" where there is no number.
+/// Four significant digits, or "-" if there is no number.
 std::string short_number(const std::optional<Real>& number);
 
-/// Text as XML writes it, in attributes too.
+/// Text escaped for XML, including attributes.
 std::string xml(const std::string& text);
 
-/// One word of a shell command.
+/// Text quoted as one word of a shell command.
 std::string shell_quoted(const std::string& text);
 
 }  // namespace nullmark

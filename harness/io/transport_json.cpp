@@ -160,7 +160,7 @@ std::string transport_label(const TransportSpec& transport) {
 }
 
 Json transport_schema() {
-  return described(closed_schema<TransportSpec>(), "what light meets beside the medium, and how paths are sampled");
+  return described(closed_schema<TransportSpec>(), "the scene around the medium, and how paths are sampled");
 }
 
 }  // namespace nullmark

@@ -12,8 +12,8 @@
 namespace nullmark {
 
 /// The loop that runs an estimator.  A block of walks of one ray steps together: all propose, the medium answers all points in
-/// one indirect call, all consume, the finished leave.  So there is one kernel per estimator and one per medium instead of one
-/// per pair, and the loop alone counts, audits the majorant and hands out random streams.
+/// one indirect call, all consume, and finished walks leave.  There is one kernel per estimator and one per medium instead of one
+/// per pair.  The loop counts lookups, checks the majorant and provides random streams.
 template <template <class> class Estimator, class Value>
 class BlockKernel : public Kernel {
   using E = Estimator<Value>;
@@ -24,7 +24,7 @@ class BlockKernel : public Kernel {
   static constexpr std::size_t kBlock = 256;
 
  protected:
-  /// A walk this long is reported as an error instead of running on: nothing may hang, and nothing may be cut short in silence.
+  /// A walk this long is an error: no walk may hang, and none may be cut short silently.
   static constexpr std::uint32_t kStepsBetweenStops = 1u << 14;
 
   struct State : Workspace {
@@ -35,7 +35,7 @@ class BlockKernel : public Kernel {
     std::array<std::uint32_t, kBlock> active;
     std::array<Real, kBlock> x, y, z, ahead{};
     std::array<Real, kBlock*(std::is_same_v<Value, Real> ? 1 : kMaxChannels)> extinction;
-    std::vector<std::uint32_t> marked;  ///< of a profile, per walk: marks told
+    std::vector<std::uint32_t> marked;  ///< for a profile, per walk: number of marks passed
   };
 
  private:
@@ -245,7 +245,7 @@ class BlockKernel : public Kernel {
     for (std::size_t a = 0; a < active; ++a) state.rng[state.active[a]].make_ready(state.ahead[a]);
   }
 
-  /// Tells the profile's marks that the walk has passed before its next collision at `reached`.
+  /// Writes the profile at the marks that the walk passes before its next collision at `reached`.
   void mark(State& state, const RayData& ray, std::uint32_t k, Real reached, std::span<const Real> marks, Real* values) const {
     if constexpr (Traits::kTransmittanceAt) {
       std::uint32_t& marked = state.marked[k];
@@ -255,7 +255,8 @@ class BlockKernel : public Kernel {
     }
   }
 
-  /// Scores of a free path: its weight in the bin of its collision, where it scatters, where it escapes, and wherever it ends.
+  /// Scores of a free path: its weight in the bin of its collision, in scatter if it scatters, in escape if it escapes, and in
+  /// weight.
   void score(State& state, const RayData& ray, std::uint32_t k, const PreparedRay& context, Real* values) const {
     if constexpr (Traits::kEvent) {
       const Event<Value> event = estimator_.event(state.walk[k], ray, state.flight[k]);

@@ -11,7 +11,7 @@ namespace nullmark {
 
 namespace detail {
 
-/// What a tracker knows of a ray: its own RayData, or MediumRay.
+/// A tracker's data of a ray: its own RayData, or MediumRay.
 template <class E, class Value>
 struct RayDataOf {
   using type = MediumRay<Value>;
@@ -56,7 +56,7 @@ NULLMARK_NAMES(weight_theory);
 
 }  // namespace detail
 
-/// What a tracker E over one kind of value has beside what every tracker must have; signatures are those of estimator.h.
+/// The optional members of a tracker E over one type of value; estimator.h has the signatures.
 template <class E, class Value>
 struct EstimatorTraits {
   using RayData = typename detail::RayDataOf<E, Value>::type;
@@ -114,7 +114,7 @@ struct EstimatorTraits {
   static constexpr bool kNeedsKnots = requires { E::kNeedsKnots; };
   static constexpr bool kNeedsShares = requires { E::kNeedsShares; };
 
-  /// Whether the harness must hand the exact optical depth of a ray to the tracker.
+  /// Whether the tracker needs the exact optical depth of a ray from the harness.
   static bool needs_optical_depth(const E& estimator) {
     if constexpr (kNeedsInversion || requires { E::kNeedsOpticalDepth; }) return true;
     if constexpr (kMayNeedOpticalDepth) return estimator.needs_optical_depth();
@@ -122,12 +122,12 @@ struct EstimatorTraits {
   }
 };
 
-/// A member by the name of an optional one, with another signature, would compile and never be called.  `message` shows the right
-/// one.
+/// A member with the name of an optional one but another signature would compile and never be called.  `message` shows the right
+/// signature.
 #define NULLMARK_EXPECT_SIGNATURE(member, has, signature) \
   static_assert(!detail::names_##member<E> || has, "a tracker's `" #member "` must be: " signature)
 
-/// Refuses, with one line that shows the signature expected, what is not a tracker.
+/// Refuses a class that is not a tracker, with one line that shows the expected signature.
 template <class E, class Value>
 consteval bool expect_estimator() {
   static_assert(

@@ -11,7 +11,7 @@
 
 namespace nullmark {
 
-/// One ray prepared for sampling: what the medium, the majorant structure and the references know of it.
+/// One ray prepared for sampling, with data from the medium, the majorant structure and the reference.
 struct PreparedRay {
   Ray world, local;  ///< cut to the medium
   std::uint32_t index = 0;
@@ -19,10 +19,10 @@ struct PreparedRay {
   std::vector<Real> knots;              ///< sorted, with begin and end; filled only when the kernel needs them
   std::optional<Spectrum> exact_depth;  ///< filled only when the kernel needs it
   Spectrum albedo;                      ///< mu_s / mu per channel; empty: 0
-  std::span<const Real> marks;          ///< distances that a profile or a free path is told at, ascending
+  std::span<const Real> marks;          ///< distances of a profile or of the bins of a free path, ascending
 };
 
-/// Distances at which a transmittance profile is told; bins of a free path, and of its law's tests.
+/// Number of distances of a transmittance profile; of bins of a free path; of bins in the tests of its law.
 inline constexpr std::size_t kProfileMarks = 8, kFreePathBins = 8, kFreePathCells = 64;
 
 inline bool scatters(const Spectrum& albedo) { return albedo.size() > 0 && albedo.maxCoeff() > 0; }
@@ -33,7 +33,7 @@ struct SampleBlock {
   std::vector<std::uint32_t> lookups;  ///< per sample
 };
 
-/// Exact event counts; adding them is associative, so any order of merging gives the same totals.
+/// Exact event counts.  Addition is associative, so any order of merging gives the same totals.
 struct Counters {
   std::uint64_t samples = 0, lookups = 0, null_collisions = 0, draws = 0, violations = 0, overruns = 0;
   Real largest_violation = 0;  ///< max mu / mub beyond 1
@@ -50,27 +50,27 @@ struct Counters {
   }
 };
 
-/// What walks did, one entry per sample in the order drawn: for replay, and for laws that a mean does not show.
+/// Recorded walks, one entry per sample in the order drawn, for replay and for tests of laws.
 struct Recording {
   struct Step {
     Real position;        ///< of the lookup, world length
     Real depth;           ///< int rate from the ray's begin to it
     Real rate;            ///< of the flight there, 1/length
-    std::uint64_t draws;  ///< so far, those that the lookup led to included
+    std::uint64_t draws;  ///< so far, including those that the lookup led to
   };
   struct Walk {
     std::vector<Step> steps;
     std::vector<Real> extinction;  ///< [step * channels + c]
     Real depth = 0;                ///< where the flight ended
-    Real total_depth = 0;          ///< of the rates it flew through
+    Real total_depth = 0;          ///< integral of the rates it flew through
     std::uint64_t draws = 0;
-    std::uint32_t collisions = 0;       ///< that the flight drew
-    EventKind end = EventKind::escape;  ///< of samplers of free paths: how, and how far along the ray, the flight ended
+    std::uint32_t collisions = 0;       ///< drawn by the flight
+    EventKind end = EventKind::escape;  ///< for free-path samplers: how and at which distance the flight ended
     Real distance = 0;
   };
   std::vector<Walk> walks;
 
-  /// Adds n walks, in memory that `restart` has kept where there is some.
+  /// Adds n walks; reuses memory that `restart` kept.
   void add(std::size_t n) {
     for (; n > 0; --n) {
       walks.emplace_back();
@@ -97,13 +97,13 @@ struct Recording {
 class Workspace {
  public:
   virtual ~Workspace() = default;
-  /// Asked now and then, so that endless walks can be interrupted; once it answers true the block under way is given up and its
+  /// Called now and then, so that endless walks can be interrupted.  Once it returns true, the current block is aborted and its
   /// samples must not be used.
   std::function<bool()> stop = [] { return false; };
-  /// Lookups that one walk may take.  The block with a walk that takes more is given up and counted as an overrun, which makes
-  /// the cell an error: a walk cut short in silence would be biased.
+  /// Lookups that one walk may take.  A block with a longer walk is aborted and counted as an overrun, which makes the cell an
+  /// error: silently cutting the walk short would cause a bias.
   std::uint32_t most_lookups = 1u << 30;
-  /// Where walks are written down; usually nowhere.
+  /// Where walks are recorded; usually null.
   Recording* recording = nullptr;
 };
 
@@ -117,27 +117,27 @@ class Kernel {
   virtual bool answers(Quantity) const = 0;
   virtual std::unique_ptr<Workspace> workspace() const = 0;
 
-  /// Numbers that one sample of a quantity gives.
+  /// Numbers per sample of a quantity.
   virtual std::size_t outputs(Quantity, const PreparedRay&) const = 0;
 
-  /// Prepares a ray; the samples and theory of that ray follow.
+  /// Prepares a ray.  Later calls for samples and theory refer to this ray.
   virtual void begin_ray(Workspace&, const Medium&, const Extrema& medium, const PreparedRay&) const = 0;
 
   /// Draws samples first .. first + count - 1 of the ray.
   virtual void sample(Workspace&, const Medium&, const PreparedRay&, std::uint64_t key, std::uint64_t first, std::size_t count,
                       Quantity, SampleBlock& out, Counters&) const = 0;
 
-  /// Mean of the estimator's target on this ray, given the exact optical depth: T = exp(-tau) or tau, unless it names another.
+  /// Mean of the estimator's target on this ray, given the exact optical depth: T = exp(-tau) or tau, unless it defines another.
   virtual Spectrum expected(const Workspace&, const Spectrum& optical_depth, Quantity) const = 0;
 
-  /// Exact moments per channel; empty where the estimator states none.  Of a free path the variance is that of its weight; of a
+  /// Exact moments per channel; empty if the estimator states none.  For a free path the variance is that of its weight.  For a
   /// profile only lookups are stated.
   virtual std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const = 0;
 
   /// Whether a sample is one flight through a majorant, so that the laws of collisions apply.
   virtual bool flies() const = 0;
 
-  /// Per channel, of estimators that are such products.
+  /// Per channel, for estimators that are products (CountLaw).
   virtual bool states_count_law() const = 0;
   virtual std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const = 0;
 };
@@ -145,13 +145,13 @@ class Kernel {
 template <class Value>
 class Walker;
 
-/// An estimator as paths use it: see walker.h.  Null where it cannot.
+/// An estimator as light paths use it: see walker.h.  Null if they cannot.
 struct Walkers {
   std::shared_ptr<const Walker<Real>> grey;
   std::shared_ptr<const Walker<Spectrum>> chromatic;
 };
 
-/// An estimator's parameters before it meets a medium.
+/// An estimator's parameters, before it is combined with a medium.
 class EstimatorSource {
  public:
   virtual ~EstimatorSource() = default;
@@ -159,11 +159,11 @@ class EstimatorSource {
   virtual Guarantee claim(Quantity) const = 0;
   virtual SampleRange range(int channels) const = 0;
   virtual bool needs_bound() const = 0;
-  /// Of a consistent estimator; empty where none is stated.
+  /// Convergence order of a consistent estimator; empty if none is stated.
   virtual std::optional<Real> order(Quantity) const = 0;
-  /// Throws ParameterError where the parameters do not fit the medium.
+  /// Throws ParameterError if the parameters do not fit the medium.
   virtual void check(const Extrema& medium) const = 0;
-  /// Null where there is none of that precision.
+  /// Null if there is none in this precision.
   virtual std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64) const = 0;
   virtual Walkers walkers() const { return {}; }
 };

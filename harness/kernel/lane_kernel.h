@@ -29,11 +29,11 @@ template <std::size_t n, class Aggregate, class Visit>
   }
 }
 
-/// The loop of BlockKernel with N walks to a register: the same estimator source over Lanes, the same steps, and in double the
-/// same samples bit for bit.  All walks of a block have taken the same number of steps, so a block is lookups done for all;
-/// walks that end leave it, and the others close ranks.  An estimator takes part by `static constexpr bool kLanes = true`, with a
-/// Walk of nothing but Value, Distance<Value> and Truth<Value>, and functions that take ray, flight and stream as auto.
-/// Transmittance and optical depth are answered so; in double the base answers what else there is, in float nothing else is.
+/// The loop of BlockKernel with N walks per register: the same estimator source over Lanes, the same steps, and in double the
+/// same samples bit for bit.  All walks of a block take a step together.  Ended walks leave the block, and the others are
+/// compacted. An estimator takes part by `static constexpr bool kLanes = true`, with a Walk that holds only Value,
+/// Distance<Value> and Truth<Value>, and with functions that take ray, flight and stream as auto.  Lanes answer transmittance and
+/// optical depth.  In double the base answers the other quantities; float has no others.
 template <template <class> class Estimator, class T, std::size_t N = kNativeLanes<T>>
 class LaneKernel final : public BlockKernel<Estimator, Real> {
   using Base = BlockKernel<Estimator, Real>;
@@ -46,16 +46,16 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
   using Streams = LaneRng<T, N>;
 
   static constexpr bool kSingle = !std::is_same_v<T, Real>;
-  static constexpr std::size_t kBlock = 2048 / sizeof(T);  ///< walks whose numbers fit the first cache together
+  static constexpr std::size_t kBlock = 2048 / sizeof(T);  ///< walks whose numbers fit the L1 cache together
 
-  /// N walks: registers of the same lanes throughout, which is how they close ranks.
+  /// N walks.  All registers have the same lane order, so one permutation compacts them.
   struct Walks {
     LanePlace<T, N> place;
     typename E::Walk walk;
     typename Streams::State stream;
     Index sample;
 
-    /// Visits every register that a step may change, with its place in the state.
+    /// Visits every register that a step may change, with its index in the state.
     template <class Visit>
     [[gnu::always_inline]] void each_moving(const Visit& visit) {
       std::size_t n = kPiece;
@@ -68,7 +68,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     }
   };
   static constexpr std::size_t kNumbers = sizeof(Walks) / sizeof(Pack), kSample = 0, kPiece = 1;
-  static constexpr std::size_t kMaskBytes = 8;  ///< as many as a mask may take when it is stored
+  static constexpr std::size_t kMaskBytes = 8;  ///< largest size of a stored mask
 
   struct State final : Base::State {
     /// [number of a walk][walk]; whole registers may be read at the end.
@@ -77,7 +77,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     alignas(HWY_MAX_BYTES) std::array<T, kBlock> extinction{};
     alignas(HWY_MAX_BYTES) std::array<T, kBlock> result{}, steps{};  ///< of walks that have ended; steps are the bits of an Index
     std::array<std::uint8_t, kBlock / N * kMaskBytes> alive{};
-    /// What ranks leave behind when they close; whole registers are written at the end.
+    /// Results of ended walks after compaction; whole registers are written at the end.
     alignas(HWY_MAX_BYTES) std::array<T, kBlock + N> left_result{}, left_sample{}, left_steps{};
   };
 
@@ -108,15 +108,15 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
  private:
   static bool in_lanes(Quantity quantity) { return quantity == Quantity::transmittance || quantity == Quantity::optical_depth; }
 
-  /// What a block adds to the counters.
+  /// Counts of a block.
   struct Tally {
     std::uint64_t draws = 0, lookups = 0, real = 0, violations = 0;
-    std::size_t walks = 0;  ///< in the first lanes, those that have ended since ranks were closed included
-    std::size_t dead = 0;   ///< lanes that step in vain
+    std::size_t walks = 0;  ///< in the first lanes, including walks that ended since the last compaction
+    std::size_t dead = 0;   ///< lanes of ended walks
   };
 
-  /// One block of samples on its way.  What runs once a block is not inlined: the code of a step then does not depend on how much
-  /// else its file holds.
+  /// One block of samples in progress.  Code that runs once per block is not inlined, so the code of a step does not depend on
+  /// what else the file holds.
   struct Run {
     const LaneKernel& kernel;
     State& state;
@@ -134,7 +134,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       return {static_cast<T>(v.x()), static_cast<T>(v.y()), static_cast<T>(v.z())};
     }
 
-    /// Where the ray does not, its points keep the coordinate that they were given when the block began.
+    /// Coordinates along which the ray does not move keep the value from the begin of the block.
     bool moves_along(std::size_t axis) const { return direction[axis] != 0; }
 
     void block(std::size_t count) {
@@ -196,7 +196,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       propose(k, walks, alive, flight, rng, step, tally);
     }
 
-    /// The walks' next points; those that have none leave their result.
+    /// Computes the next points of the walks; ended walks store their result.
     template <bool several>
     [[gnu::always_inline]] void propose(std::size_t k, Walks& walks, Mask alive, LaneFlight<T, N, several>& flight, Streams& rng,
                                         std::uint32_t step, Tally& tally) {
@@ -237,7 +237,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       counters.largest_violation = std::max<Real>(counters.largest_violation, *std::max_element(x, x + N));
     }
 
-    /// Hands out what the dead have left and moves the living together; tells how many lanes they take.
+    /// Writes out the results of ended walks and compacts the others; returns the number of lanes that these take.
     [[gnu::noinline]] std::size_t close_ranks(std::size_t lanes, Tally& tally) {
       std::size_t kept = 0, left = 0;
       for (std::size_t k = 0; k < lanes; k += N) {
@@ -277,18 +277,18 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
         return lanes;
     }
 
-    /// Any register, as it is kept among the numbers.
+    /// Any register, as stored among the numbers.
     static Pack bits(const auto& lanes) { return hn::BitCast(typename Pack::Tag(), raw(lanes)); }
   };
 
   E estimator_;
 };
 
-/// An estimator over registers of this build's width.
+/// Lane kernel with registers of this build's width.
 template <template <class> class Estimator, class T>
 using LanesOf = Estimator<Lanes<T, kNativeLanes<T>>>;
 
-/// Whether all that a walk calls takes lanes.
+/// Whether all functions of a walk accept lanes.
 template <template <class> class Estimator>
 constexpr bool runs_in_lanes() {
   if constexpr (requires { requires Estimator<Real>::kLanes; }) {

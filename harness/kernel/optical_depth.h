@@ -14,7 +14,7 @@ struct DepthWithError {
 };
 DepthWithError optical_depth(const Medium& medium, const Ray& local);
 
-/// begin, the medium's knots in between, end; sorted, without repetitions.
+/// Begin, the medium's knots in between, end; sorted, without repetitions.
 void sorted_knots(const Medium& medium, const Ray& local, std::vector<Real>& out);
 
 }  // namespace nullmark

@@ -272,7 +272,7 @@ std::string why_no_paths(const EstimatorSource& estimator, const TransportScene&
 std::unique_ptr<const Kernel> make_path_kernel(const EstimatorSource& estimator, const TransportScene& scene, bool general) {
   scene.check();
   if (const std::string reason = why_no_paths(estimator, scene, general); !reason.empty())
-    throw ParameterError("type", "the estimator cannot carry light here: " + reason);
+    throw ParameterError("type", "the estimator cannot compute radiance here: " + reason);
   const Effects effects = asked_for(scene, general);
   if (!effects.scattering && !effects.emission) {
     if (!effects.heterogeneous) return make_beer_lambert_kernel(scene);

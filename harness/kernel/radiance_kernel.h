@@ -23,7 +23,7 @@ inline Ray moved_to_begin(Ray ray) {
   return ray;
 }
 
-/// Where the medium lies.
+/// Location of the medium.
 struct MediumFrame {
   explicit MediumFrame(const Medium& medium) : to_local(medium.world_to_local()), bounds(medium.bounds()) {}
 
@@ -54,10 +54,10 @@ inline Spectrum or_black(const Spectrum& radiance, int channels) { return radian
 /// Radiance of the surface that was hit, or of the environment.
 Spectrum radiance_behind(const TransportScene& scene, const SurfaceHit& hit);
 
-/// The mean of what arrives along a camera's ray, where it is known; else NaN: see make_path_kernel.
+/// The mean radiance along a camera ray if known, else NaN: see make_path_kernel.
 Spectrum known_radiance(const TransportScene& scene, const Ray& camera);
 
-/// What all kernels of light have in common.
+/// Common base of all radiance kernels.
 class RadianceKernel : public Kernel {
  public:
   explicit RadianceKernel(const TransportScene& scene)
@@ -85,8 +85,8 @@ class RadianceKernel : public Kernel {
   int channels_;
 };
 
-/// Where light is only absorbed: by constant extinction nothing is drawn; by any medium it is the T of `transmittance` times the
-/// radiance behind.
+/// For scenes that only absorb: the T of `transmittance` times the radiance behind the medium.  With constant extinction nothing
+/// is drawn.
 std::unique_ptr<const Kernel> make_beer_lambert_kernel(const TransportScene& scene);
 std::unique_ptr<const Kernel> make_absorption_kernel(const TransportScene& scene, std::unique_ptr<const Kernel> transmittance);
 

@@ -14,24 +14,24 @@
 
 namespace nullmark {
 
-/// How the direction towards the environment is drawn at a scattering, if it is drawn at all.
+/// How a direction towards the environment is drawn at each scattering, if at all.
 enum class NextEvent { off, phase, uniform };
 
-/// How paths are sampled; none of it changes the mean, except `most_scatterings`, which changes what is asked for.
+/// How paths are sampled.  Only `most_scatterings` changes the mean, because it changes the quantity.
 struct PathOptions {
   NextEvent next_event = NextEvent::off;
-  /// Scatterings from which on Russian roulette decides whether a path goes on: with probability min(1, largest |throughput|),
-  /// but at least `roulette_floor` in (0, 1].  Left out: never.
+  /// Number of scatterings after which Russian roulette begins.  A path continues with probability min(1, largest |throughput|),
+  /// but at least `roulette_floor` in (0, 1].  Absent: no roulette.
   std::optional<int> roulette_from = 4;
   Real roulette_floor = 0.05;
-  /// The quantity becomes the radiance of light that was scattered at most so often, 0 being emission and what is seen through
-  /// the medium.  Left out: all light.
+  /// Restricts the quantity to light that was scattered at most this many times; 0 is emission and what is seen through the
+  /// medium. Absent: all light.
   std::optional<int> most_scatterings{};
-  /// Flights and lookups after which a path is given up and counted as an overrun.
+  /// Flights and lookups after which a path is aborted and counted as an overrun.
   std::uint64_t most_events = 1u << 30;
 };
 
-/// All that light meets.  Parts that are left out cost nothing: see Effects.
+/// The scene for light.  Absent parts cost nothing: see Effects.
 struct TransportScene {
   std::shared_ptr<const Medium> medium;
   std::shared_ptr<const MajorantStructure> majorant;
@@ -41,14 +41,14 @@ struct TransportScene {
   Environment environment;  ///< behind everything
   std::vector<Surface> surfaces;
   PathOptions options;
-  Walkers towards_environment;  ///< whose transmittance weighs next events; empty: that of the paths' sampler
+  Walkers towards_environment;  ///< estimate the transmittance of next events; empty: the sampler of the paths does
 
-  /// Throws ParameterError, naming the part, where the parts do not fit each other.
+  /// Throws ParameterError that names the part if the parts do not fit each other.
   void check() const;
 };
 
-/// What a scene asks a path for.  Kernels are compiled for scattering, emission, anisotropic, surfaces and next_event, and for
-/// chromatic by their kind of Value; heterogeneous decides between the sampler and closed-form flights.
+/// Effects of a scene.  Kernels are compiled for scattering, emission, anisotropic, surfaces and next_event, and for chromatic by
+/// their type of Value.  heterogeneous decides between the sampler and closed-form flights.
 struct Effects {
   bool absorption = true, scattering = true, emission = true, anisotropic = true, chromatic = true, heterogeneous = true,
        surfaces = true, next_event = true;
@@ -61,7 +61,7 @@ Real brightest(const TransportScene& scene);
 
 Effects effects_of(const TransportScene& scene);
 
-/// Names of those that are on, in the order of the fields.
+/// Names of the effects that are on, in the order of the fields.
 std::vector<std::string> effect_names(const Effects& effects);
 
 }  // namespace nullmark

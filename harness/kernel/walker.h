@@ -13,7 +13,7 @@ namespace nullmark {
 
 namespace detail {
 
-/// Chances of the components of a sum in every segment, in proportion to their bounds along it.
+/// Probabilities of the components of a sum in every segment, proportional to their bounds there.
 template <class Along>
 void prepare_shares(Along& ray, const Medium& medium, const Ray& local) {
   ray.shares.clear();
@@ -27,7 +27,7 @@ void prepare_shares(Along& ray, const Medium& medium, const Ray& local) {
 
 }  // namespace detail
 
-/// What all walks of a scene share.
+/// Data that all walks of a scene share.
 template <class Value>
 struct PathScene {
   const Medium* medium = nullptr;
@@ -38,15 +38,15 @@ struct PathScene {
   bool draws_absorption = true;
 };
 
-/// How long the walks of one sample may go on.  Every lookup and every flight is one event.
+/// Budget of the walks of one sample.  Every lookup and every flight is one event.
 class EventBudget {
  public:
   explicit EventBudget(const std::function<bool()>& stop) : stop_(stop) {}
 
-  /// A sample begins, which may take so many events.
+  /// Begins a sample with a budget of this many events.
   void start(std::uint64_t most_events) { left_ = most_events; }
 
-  /// Counts an event; false once the sample is to be given up: its events are used up, which is an overrun, or all is to stop.
+  /// Counts an event.  False if the sample must be aborted, because its budget is spent (an overrun) or the run stops.
   bool spend() {
     if (left_ == 0) return false;
     if (--left_ == 0) ++overruns_;
@@ -73,18 +73,18 @@ struct WalkMemory {
   virtual ~WalkMemory() = default;
 };
 
-/// Walks through a medium one at a time and along any ray, as paths need them: free flights, and transmittance towards lights.
-/// Immutable; one instance serves all threads.  A walk that runs out of budget returns early, and its answer must not be used.
+/// Walks one at a time along any ray, for light paths: free flights, and transmittance towards lights.  Immutable; one instance
+/// serves all threads.  A walk that runs out of budget returns early, and its result must not be used.
 template <class Value>
 class Walker {
  public:
   virtual ~Walker() = default;
   virtual std::unique_ptr<WalkMemory> memory() const = 0;
 
-  /// Whether `fly` answers for so many channels.
+  /// Whether `fly` supports this many channels.
   virtual bool samples_events(int channels) const = 0;
 
-  /// What the medium must have: a polynomial extinction between knots, an optical depth in closed form.
+  /// Requirements on the medium: a polynomial extinction between knots, a closed-form optical depth.
   virtual bool needs_knots() const = 0;
   virtual bool needs_optical_depth() const = 0;
 
@@ -92,7 +92,7 @@ class Walker {
   /// grown.
   virtual void begin(WalkMemory&, const PathScene<Value>&, const Ray& world, const Ray& local) const = 0;
 
-  /// One free flight.  `throughput` is the weight the path has before it.
+  /// One free flight.  `throughput` is the weight of the path before it.
   virtual Event<Value> fly(WalkMemory&, const PathScene<Value>&, const Value& throughput, Rng&, EventBudget&,
                            Counters&) const = 0;
 
@@ -100,8 +100,8 @@ class Walker {
   virtual Value transmittance(WalkMemory&, const PathScene<Value>&, Rng&, EventBudget&, Counters&) const = 0;
 };
 
-/// Walks by an estimator.  An estimator whose RayData has a field `Value throughput` finds there the weight of the path so far,
-/// as history-aware collision probabilities want it [Kutz et al. 2017, Sec. 5].
+/// Walks of an estimator.  If its RayData has a field `Value throughput`, this is set to the weight of the path so far, as
+/// history-aware collision probabilities require [Kutz et al. 2017, Sec. 5].
 template <template <class> class Estimator, class Value>
 class EstimatorWalker final : public Walker<Value> {
   using E = Estimator<Value>;
@@ -178,7 +178,7 @@ class EstimatorWalker final : public Walker<Value> {
   }
 
  private:
-  /// Walks to the end and tells where that is.
+  /// Walks to the end and returns its distance.
   Flight walk(State& state, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget, Counters& counters) const {
     Flight flight;
     flight.start(state.ray.majorant);

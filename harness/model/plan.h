@@ -14,7 +14,7 @@
 namespace nullmark {
 
 using ParameterValue = std::variant<Real, int, bool, std::string, std::vector<Real>, std::array<Real, 3>>;
-/// By parameter name, complete: defaults are filled in.
+/// By parameter name; defaults are filled in.
 using ParameterValues = std::map<std::string, ParameterValue>;
 
 /// A registered type with its parameters: an estimator, a medium's field, a majorant structure or a ray set.
@@ -56,20 +56,20 @@ struct SurfaceSpec {
   bool operator==(const SurfaceSpec&) const = default;
 };
 
-/// What light meets beside the medium, and how paths are sampled (harness/kernel/path_kernel.h).
+/// The scene around the medium, and how paths are sampled (harness/kernel/path_kernel.h).
 struct TransportSpec {
   std::vector<Real> environment;  ///< radiance, one for all channels or one each; empty: 0
   std::vector<SurfaceSpec> surfaces;
   std::string next_event = "off";        ///< "off", "phase" or "uniform"
-  std::optional<int> roulette_from = 4;  ///< scatterings; left out: no roulette
+  std::optional<int> roulette_from = 4;  ///< number of scatterings; absent: no roulette
   Real roulette_floor = 0.05;
-  std::optional<int> most_scatterings{};  ///< left out: all light
-  bool general = false;                   ///< the kernel of all effects instead of the scene's own
+  std::optional<int> most_scatterings{};  ///< absent: all light
+  bool general = false;                   ///< use the kernel with all effects instead of that of the scene
 
   bool operator==(const TransportSpec&) const = default;
 };
 
-/// What is done to every single sample (and to the reference) before it enters the statistics.
+/// Applied to every sample, and to the reference, before it enters the statistics.
 struct Measurement {
   bool clamp = false;     ///< to [0, 1]
   int quantise_bits = 0;  ///< 0: none; n: round to the nearest multiple of 1/(2^n - 1)
@@ -77,21 +77,21 @@ struct Measurement {
   bool operator==(const Measurement&) const = default;
 };
 
-/// When the laws of a cell's walks are tested: where its mean is undecidable, or always, or never.
+/// When the laws of a cell's walks are tested: if its mean is undecidable, always, or never.
 enum class LawPolicy { undecided, always, never };
 
-/// Which bias is a FAIL: any that is proven, or one that is proven to be beyond epsilon.
+/// Which bias is a FAIL: any proven bias, or only one proven beyond epsilon.
 enum class Tolerate { nothing, epsilon };
 
-/// What a cell's verdict must prove and what that may cost.
+/// What the verdict of a cell must prove, and what it may cost.
 struct VerdictSpec {
   bool enabled = true;
-  std::optional<Real> epsilon{};  ///< relative to the mean reference; left out: by the optical depth, see test_plan.cpp
-  /// Where undecided; 0: samples_per_ray, and up to four times as many where they were enough by the plan.
+  std::optional<Real> epsilon{};  ///< relative to the mean reference; absent: by the optical depth, see test_plan.cpp
+  /// Drawn while the verdict is open; 0: samples_per_ray, and up to four times as many if the plan says that they suffice.
   std::uint64_t max_samples_per_ray = 0;
   std::optional<Real> max_lookups_per_ray{};  ///< expected lookups that all samples of a ray may cost
   Tolerate tolerate = Tolerate::nothing;
-  bool all_samples = false;  ///< drawn while undecided, also where the plan knows that they are too few
+  bool all_samples = false;  ///< draw them while undecided, even if the plan says that they do not suffice
   LawPolicy laws = LawPolicy::undecided;
 
   bool operator==(const VerdictSpec&) const = default;
@@ -100,21 +100,21 @@ struct VerdictSpec {
 /// Error levels of a whole configuration.
 struct ErrorRates {
   Real alpha = 1e-4;       ///< chance of even one false FAIL among all mean tests, and the same among all lookup tests
-  Real alpha_pass = 1e-3;  ///< chance of a false PASS, of each test
+  Real alpha_pass = 1e-3;  ///< chance of a false PASS of one test
 
   bool operator==(const ErrorRates&) const = default;
 };
 
-/// A mean that the configuration gives, where none can be computed here.
+/// A mean given by the configuration, for cells whose mean cannot be computed here.
 struct GivenReference {
   std::vector<Real> value;  ///< one for all outputs or one each
-  Real error = 0;           ///< bound on its own error, relative
+  Real error = 0;           ///< relative bound on the error of the value
   std::string source;
 
   bool operator==(const GivenReference&) const = default;
 };
 
-/// One point of a sweep.  Indices refer to the plan's lists, in which equal specifications stand once.
+/// One point of a sweep.  Indices refer to the plan's lists, which hold equal specifications once.
 struct Cell {
   std::string id;    ///< hash of everything that decides the statistics
   std::string name;  ///< "estimator/medium/majorant", unique in the plan (experiment and seed are prefixed where needed)
@@ -128,9 +128,9 @@ struct Cell {
   std::uint64_t samples_per_ray = 1;
   std::optional<Real> equal_lookups{};  ///< lookups per ray: samples_per_ray becomes this over the expected lookups per sample
   std::uint64_t seed = 1;
-  bool own_streams = false;  ///< streams keyed by the estimator too, instead of common random numbers
+  bool own_streams = false;  ///< streams depend on the estimator too, instead of common random numbers
   bool images = false;
-  Real image_maximum = 1;  ///< value shown white
+  Real image_maximum = 1;  ///< value shown as white
   VerdictSpec verdict{};
   std::optional<GivenReference> reference{};
 };
@@ -139,9 +139,9 @@ struct Cell {
 struct TimingPlan {
   bool enabled = true;
   int repetitions = 5;
-  Real seconds = 0.02;  ///< least time of one repetition
-  /// Samples that share one walk through the majorant structure, ascending.  The last is what a cell's time says; those before it
-  /// tell what fewer samples cost.
+  Real seconds = 0.02;  ///< minimum time of one repetition
+  /// Samples that share one walk through the majorant structure, ascending.  The time of a cell is that of the last number; the
+  /// others measure the cost of fewer samples.
   std::vector<std::uint64_t> samples_per_traversal{64};
 };
 
@@ -151,8 +151,8 @@ struct TableRow {
   std::vector<std::pair<std::string, Real>> given;         ///< column heading, number from the source
   std::vector<std::pair<std::string, std::string>> cells;  ///< column heading, cell name
   std::optional<std::string> theory_of;                    ///< cell name whose theory column is shown
-  std::optional<std::string> relative_to;                  ///< cell name that the row's metrics are divided by
-  std::optional<Real> tolerance;  ///< relative: every measured number must be so near the first given one
+  std::optional<std::string> relative_to;                  ///< cell name; the row's metrics are divided by those of this cell
+  std::optional<Real> tolerance;  ///< relative distance allowed between each measured number and the first given one
   std::string note;               ///< e.g. "not reproduced"
 };
 struct Table {
@@ -160,7 +160,7 @@ struct Table {
   std::vector<TableRow> rows;
 };
 
-/// A configuration, expanded: plain data.
+/// An expanded configuration, as plain data.
 struct Plan {
   std::string name;
   std::vector<MediumSpec> media;
@@ -171,7 +171,7 @@ struct Plan {
   ErrorRates error_rates;
   std::vector<Table> tables;
   std::vector<PublishedClaim> claims;
-  std::map<std::string, std::string> credits;  ///< author and licence, by a data file's name
+  std::map<std::string, std::string> credits;  ///< author and licence, by name of the data file
   std::string config_text;                     ///< the configuration as applied, JSON
 };
 

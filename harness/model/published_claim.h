@@ -7,24 +7,24 @@
 
 namespace nullmark {
 
-/// How a part of a claim compares what was measured with what it should be.
+/// How a part of a claim compares the measured with the claimed.
 enum class Relation { near, at_most, at_least, unbiased };
 
-/// One comparison, or one of the same kind for each of several cells.
+/// One comparison, or the same comparison for each of several cells.
 struct ClaimPart {
-  std::string says;  ///< what this part of the claim is, in words; may be empty where there is one part
+  std::string says;  ///< this part of the claim in words; may be empty if it is the only part
   Relation relation = Relation::near;
-  std::string metric;               ///< of every cell; none for `unbiased`
+  std::string metric;               ///< compared for every cell; empty for `unbiased`
   std::vector<std::string> cells;   ///< names of cells
   std::vector<Real> numbers;        ///< to compare with: one for all cells, or one each
   std::vector<std::string> others;  ///< to compare with: the same metric of a cell for each
-  bool theory = false;              ///< to compare with: what theory says of the metric of each cell
-  Real factor = 1;                  ///< on what is compared with
+  bool theory = false;              ///< to compare with: the metric of each cell from theory
+  Real factor = 1;                  ///< multiplies what is compared with
   Real tolerance = 0;               ///< `near`: relative
-  std::string slope_against;        ///< not empty: log metric against log of this metric over all cells, its slope is compared
+  std::string slope_against;        ///< not empty: compares the slope of log metric over log of this metric
 };
 
-/// A statement of a publication that cells of this configuration put to the test.
+/// A statement of a publication that cells of this configuration test.
 struct PublishedClaim {
   std::string id;      ///< "C03"
   std::string source;  ///< paper and place

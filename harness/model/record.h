@@ -34,7 +34,7 @@ struct ConvergenceRecord {
   std::vector<std::optional<Real>> rmse, variance;  ///< per channel
 };
 
-/// What a sample costs where so many share a walk through the majorant structure.
+/// Cost of a sample if this many samples share a walk through the majorant structure.
 struct BatchTime {
   std::uint64_t samples_per_traversal = 1;
   Real ns_per_sample = 0, mad = 0;
@@ -49,25 +49,25 @@ struct TimeRecord {
   std::uint64_t samples_per_traversal = 1;
   std::vector<Real> repetition_ns;   ///< ns per sample of each repetition
   Real majorant_build_seconds = 0;   ///< wall time of building the majorant structure, on all threads
-  std::vector<BatchTime> batches{};  ///< ascending; the last is that of ns_per_sample; empty where it is the only one
+  std::vector<BatchTime> batches{};  ///< ascending; the last has ns_per_sample; empty if there is only one
   Real memory_ratio = 0;             ///< of volumes: ns per lookup over one read of a random cache line of as many bytes; else 0
   std::optional<Real> waiting{};     ///< share of the wall time in which the timed thread did not run, median over repetitions
 };
 
-/// PASS: |bias| < epsilon is proven.  FAIL: a bias is proven (or one beyond epsilon, as `Tolerate` says).  INCONCLUSIVE: neither,
-/// with the reason.  VIOLATED: the estimator needs a true majorant and did not have one.  Empty: nothing is claimed, or nothing
-/// was tested.
+/// PASS: |bias| < epsilon is proven.  FAIL: a bias is proven (or one beyond epsilon, by `Tolerate`).  INCONCLUSIVE: neither is
+/// proven; the reason says why.  VIOLATED: the estimator needs a true majorant and did not have one.  None: nothing is claimed,
+/// or nothing was tested.
 enum class Outcome { none, pass, fail, inconclusive, violated };
 
-/// Evidence of one test, as `check` derives its outcome.
+/// Evidence of one test, from which `check` derives its outcome.
 struct TestRecord {
   int channel = 0;  ///< -1: lookups
   int group = -1;   ///< -1: all rays
   std::uint64_t samples = 0;
   Real epsilon = 0, reference_error = 0;  ///< absolute
   Real reference = 0;                     ///< expected mean, averaged over the rays of the test
-  Real mean_error = 0;                    ///< of the samples against it
-  Real variance = 0;                      ///< that the bets were planned with
+  Real mean_error = 0;                    ///< mean of the samples minus the reference
+  Real variance = 0;                      ///< the variance that the bets were planned with
   /// "betting", "catoni", "catoni+betting", "deterministic", "none" (nothing could be bet), or "counted" (lookups, where the
   /// harness draws the flights: see counted_lookups.h).
   std::string basis;
@@ -81,7 +81,7 @@ struct TestRecord {
   bool deterministic() const { return basis == "deterministic"; }
 };
 
-/// A law that walks must follow, as `check` derives its outcome.
+/// Evidence against a law that walks must follow, from which `check` derives its outcome.
 struct LawRecord {
   std::string name;
   Real log_e = 0;             ///< evidence against it: log of an e-value, or -log of a probability
@@ -90,30 +90,30 @@ struct LawRecord {
 };
 
 struct VerdictRecord {
-  /// Of the mean: against the reference for estimators that claim to be unbiased, else against the mean they predict of
-  /// themselves, which proves nothing about T.
+  /// Outcome for the mean: `unbiased` against the reference, for estimators that claim to be unbiased; `own_mean` against the
+  /// mean that the estimator predicts for itself, which proves nothing about T.
   Outcome unbiased = Outcome::none, own_mean = Outcome::none;
   Outcome lookups = Outcome::none;
-  std::string reason;  ///< of an INCONCLUSIVE, or what fails
+  std::string reason;  ///< why it is INCONCLUSIVE, or what fails
   std::string proves;  ///< what a PASS proves: "|bias| < 0.37 % of the mean"
   Tolerate tolerate = Tolerate::nothing;
   bool within = false, beyond = false, biased = false;  ///< what is proven of the mean error: see verdict.h
   std::string against;                                  ///< "reference", or "own mean" of an estimator that predicts its bias
   std::string variance_basis;                           ///< "analytic", "pilot" or "none"
-  bool planned_undecidable = false;                     ///< the plan said beforehand that no affordable number of samples decides
+  bool planned_undecidable = false;                     ///< the plan found that no affordable number of samples decides
   bool violated = false;                                ///< needs a true majorant, and the extinction was seen above it
   bool bound_unproven = false;                          ///< the majorant is not known to bound, and nothing was seen above it
-  std::uint64_t counted_walks = 0;                      ///< whose lookups were found to be their collisions, one by one
-  std::uint64_t nonfinite = 0;                          ///< among the samples beyond the planned ones
+  std::uint64_t counted_walks = 0;                      ///< walks whose lookups were checked to be their collisions, one by one
+  std::uint64_t nonfinite = 0;                          ///< number among the samples beyond samples_per_ray of the cell
   std::uint64_t out_of_range = 0;                       ///< samples outside the range the estimator declares
-  std::uint64_t samples_per_ray = 0;                    ///< used in the end
+  std::uint64_t samples_per_ray = 0;                    ///< drawn in total
   std::uint64_t planned = 0, affordable = 0;            ///< samples per ray
   std::uint64_t family = 1, lookups_family = 1;
   Real alpha = 1e-4, alpha_pass = 1e-3;
   std::vector<TestRecord> tests;
   std::uint64_t laws_family = 1;
-  std::vector<LawRecord> laws;        ///< how samples and walks behave beside their mean: see walk_laws.h
-  std::vector<std::string> untested;  ///< what the claims rest on and no law tests, with the reason
+  std::vector<LawRecord> laws;        ///< properties of samples and walks other than the mean: see walk_laws.h
+  std::vector<std::string> untested;  ///< assumptions that no law tests, with the reason
   Outcome lawful = Outcome::none;     ///< PASS: no law is broken
 };
 
@@ -122,13 +122,13 @@ struct CellRecord {
   MediumSpec medium;
   Component majorant, ray_set;
   std::string medium_hash;
-  std::optional<StructureSize> structure;  ///< of the majorant; absent where it was not built
+  std::optional<StructureSize> structure;  ///< of the majorant; absent if it was not built
   std::string claims, range;
   bool given_depth = false;      ///< the estimator is handed the exact optical depth
-  std::optional<Real> reliance;  ///< of such: how much of its answer is that depth, 1 all of it; see reliance.h
-  std::optional<Real> order;     ///< of a consistent estimator's bias in its step
+  std::optional<Real> reliance;  ///< if given_depth: share of its answer that follows that depth, 1: all; see reliance.h
+  std::optional<Real> order;     ///< order in the step of a consistent estimator's bias
   int channels = 1;
-  std::vector<std::string> outputs;  ///< of quantities with several numbers a channel, what each entry of `channel` is
+  std::vector<std::string> outputs;  ///< for quantities with several numbers per channel: the names of the entries of `channel`
   std::vector<std::string> effects{"absorption"};
   Status status = Status::not_run;
   std::string reason;
@@ -138,17 +138,18 @@ struct CellRecord {
   std::vector<ChannelRecord> channel;
   std::optional<Real> lookups_per_sample, lookups_theory, null_collisions_per_sample, draws_per_sample;
   std::uint64_t lookups = 0, draws = 0;  ///< exact totals
-  /// Of one sample's lookups, averaged over the rays; where every ray has one sample, over all of them, which is more.
+  /// Variance of the lookups of one sample, averaged over the rays.  If every ray has one sample: variance over all rays, which
+  /// is larger.
   std::optional<Real> lookups_variance;
-  std::optional<std::uint64_t> instructions;  ///< that drawing the samples took, counted in a simulator; see performance_gate.md
+  std::optional<std::uint64_t> instructions;  ///< of drawing the samples, counted in a simulator; see performance_gate.md
   std::uint64_t majorant_violations = 0, nonfinite = 0;
-  std::optional<Real> largest_violation;  ///< max mu / mub seen beyond 1
+  std::optional<Real> largest_violation;  ///< largest mu / mub above 1
   std::optional<Real> largest_sample;     ///< max |X| of the finite samples, all outputs together
   std::optional<TimeRecord> time;
   std::optional<VerdictRecord> verdict;
   std::vector<ConvergenceRecord> convergence;
-  /// Mean squared errors of disjoint parts of the samples (BlockErrors), averaged over channels; estimators on the same streams
-  /// have the same parts.  Empty where there are too few samples, and for quantities with several numbers a channel.
+  /// Mean squared errors of disjoint parts of the samples (BlockErrors), averaged over channels.  Estimators with the same
+  /// streams have the same parts.  Empty if there are too few samples, and for quantities with several numbers per channel.
   std::vector<Real> squared_error_blocks;
   std::map<std::string, std::string> images;  ///< "mean", "variance", "lookups" -> path relative to the results file
 };

@@ -13,24 +13,24 @@
 
 namespace nullmark {
 
-/// The four registries a configuration names its parts from.
+/// The four registries of components that a configuration can name.
 enum class ComponentKind { estimator, medium, majorant, ray_set };
 
 /// "estimator", "medium", "majorant" or "ray set".
 const char* to_string(ComponentKind kind);
 
-/// What a component tells of one of its parameters.  The default's alternative is the parameter's type; a choice is a string with
-/// `allowed` not empty.
+/// Description of one parameter of a component.  The type of the default is the type of the parameter; a choice is a string with
+/// a non-empty `allowed`.
 struct ParameterInfo {
   std::string name, unit, text;
   ParameterValue default_value;
-  Range range;                       ///< numbers: of each
+  Range range;                       ///< numbers: range of each
   int low = 0, high = 0;             ///< integer: both included
   std::vector<std::string> allowed;  ///< choice
   int least = 0, most = 0;           ///< numbers: how many
 };
 
-/// What a registry tells of an entry.
+/// Description of a registered component.
 struct ComponentInfo {
   std::string name, summary, source;
 };
@@ -38,7 +38,7 @@ struct ComponentInfo {
 /// Sorted by name, without planted bugs.
 std::vector<ComponentInfo> registered(ComponentKind kind);
 
-/// An estimator that `registered` leaves out although it may be named.
+/// Whether an estimator can be named although `registered` leaves it out.
 bool is_planted(std::string_view estimator);
 
 /// In declared order.  Throws ParameterError for a type that is not registered.
@@ -47,12 +47,12 @@ std::vector<ParameterInfo> parameters_of(ComponentKind kind, std::string_view ty
 /// The type and the parameters that differ from their defaults, in declared order: "residual_ratio/control:average".
 std::string make_label(const std::string& type, const ParameterValues& values, const std::vector<ParameterInfo>& parameters);
 
-/// "0.5", "true", "1,2,3" or the text itself; the shortest form that reads back to the same number.
+/// "0.5", "true", "1,2,3" or the text itself; the shortest form that gives the same number when read.
 std::string to_text(const ParameterValue& value);
 
 /// Build a component's registered source and assign its parameters.  ${NULLMARK_...} in text parameters is replaced by the
-/// environment variable's value, so it appears in no label and no id.  Throw ParameterError for an unknown type or parameter or a
-/// value of another type, MissingData for a variable that is not set.
+/// environment variable here, so labels and ids do not contain its value.  Throw ParameterError for an unknown type or parameter
+/// or a value of another type, MissingData for a variable that is not set.
 std::unique_ptr<MediumSource> make_medium(const Component& component);
 std::unique_ptr<MajorantSource> make_majorant(const Component& component);
 std::unique_ptr<RaySetSource> make_ray_set(const Component& component);

@@ -9,17 +9,17 @@
 
 namespace nullmark {
 
-/// What commands and tests know of an estimator by its name; the facts are those of estimator.h.
+/// Properties of a registered estimator for commands and tests; estimator.h explains them.
 struct EstimatorEntry {
   std::string name, summary, source;
   SampleRange range = SampleRange::any_sign;
   bool needs_bound = false;
   bool in_lanes = false;  ///< grey walks run side by side in registers, in double and in float
   bool ignores_majorant = false, heavy_samples = false, heavy_lookups = false;
-  std::vector<Quantity> quantities;  ///< that it answers on grey media
+  std::vector<Quantity> quantities;  ///< quantities that it answers on grey media
   std::unique_ptr<EstimatorSource> (*make)() = nullptr;
-  bool planted = false;   ///< a deliberately wrong tracker that the tests must catch; runs when named, is never listed
-  std::string caught_by;  ///< planted: the check that must see it
+  bool planted = false;   ///< deliberately wrong, for tests; runs if named, is never listed
+  std::string caught_by;  ///< planted: the check that must catch it
 };
 
 }  // namespace nullmark

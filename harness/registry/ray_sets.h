@@ -15,15 +15,15 @@ namespace nullmark {
 /// image.
 struct RaySet {
   std::vector<Ray> rays;
-  int width = 0, height = 0;  ///< 0 x 0 where the rays form no image
+  int width = 0, height = 0;  ///< 0 x 0 if the rays form no image
 };
 
-/// Makes a ray set that looks at a medium's world bounds.
+/// Makes a set of rays for the world bounds of a medium.
 class RaySetSource {
  public:
   virtual ~RaySetSource() = default;
   virtual void parameters(ParameterVisitor& visit) = 0;
-  /// How many `rays` makes.
+  /// Number of rays that `rays` makes.
   virtual std::size_t count() const = 0;
   virtual RaySet rays(const Box& world_bounds) const = 0;
 };

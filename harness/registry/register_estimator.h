@@ -28,7 +28,7 @@ EstimatorEntry estimator_entry() {
   return entry;
 }
 
-/// Whether an estimator with kLanes has what lanes take.
+/// Whether an estimator with kLanes meets the requirements of lanes.
 template <template <class> class Estimator>
 consteval bool has_the_lanes_it_claims() {
   if constexpr (requires { requires Estimator<Real>::kLanes; }) return runs_in_lanes<Estimator>();
@@ -48,7 +48,7 @@ EstimatorEntry planted_entry() {
 
 }  // namespace nullmark
 
-/// One line makes an estimator known to every command and to the contract tests.  In the tree the build writes it from
+/// Registers an estimator for all commands and contract tests.  In the repository the build generates this line from
 /// `nullmark_estimator(header Class)`; a plug-in writes it itself.
 #define NULLMARK_REGISTER_ESTIMATOR(Estimator)                                                                      \
   static_assert(::nullmark::has_the_lanes_it_claims<Estimator>(),                                                   \
@@ -56,7 +56,7 @@ EstimatorEntry planted_entry() {
   [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_estimator_, __COUNTER__) =                       \
       ::nullmark::Registry<::nullmark::EstimatorEntry>::instance().add(::nullmark::estimator_entry<Estimator>())
 
-/// The same for a planted bug; `__VA_ARGS__` is its template and, where that is not EstimatorTemplate, its source.
+/// The same for a planted bug; `__VA_ARGS__` is its template and, if that is not EstimatorTemplate, its source.
 #define NULLMARK_REGISTER_PLANTED_BUG(...)                                                  \
   [[maybe_unused]] static const bool NULLMARK_CONCATENATE(nullmark_planted_, __COUNTER__) = \
       ::nullmark::Registry<::nullmark::EstimatorEntry>::instance().add(::nullmark::planted_entry<__VA_ARGS__>())

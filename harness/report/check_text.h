@@ -6,7 +6,7 @@
 
 namespace nullmark {
 
-/// For the terminal: every cell that did not pass or has a mark, with its reason or what it proves, then counts.
+/// For the terminal: every cell that did not pass or has a mark, with its reason or what it proves; then the totals.
 std::string summary_text(const RunRecord& run, const Summary& summary);
 
 /// The same for a pull request.

@@ -45,7 +45,7 @@ std::string break_even_shown(const RankedCell& ranked) {
   if (!ranked.break_even) return "";
   switch (ranked.break_even->kind) {
     case BreakEven::Kind::first_sample:
-      return "its first sample";
+      return "the first unbiased sample";
     case BreakEven::Kind::never_cheaper:
       return "never cheaper";
     case BreakEven::Kind::no_floor_seen:

@@ -8,8 +8,8 @@
 namespace nullmark {
 
 /// A table per comparison (harness/analysis/comparison.h): trackers by time to 1 % relative error, each number with its 95 %
-/// interval, beside the baseline (default: the first that is unbiased); with `paired`, ratios of mean squared errors on common
-/// streams as well. Empty where no cell was sampled.  Throws InputError when the baseline names no estimator of the results.
+/// interval, compared with the baseline (default: the first that claims to be unbiased).  With `paired` also ratios of mean
+/// squared errors on common streams.  Empty if no cell was sampled.  Throws InputError if the results hold no such baseline.
 std::string compare_text(const std::vector<RunRecord>& runs, const std::string& baseline, bool paired);
 
 /// The same for a pull request.

@@ -32,7 +32,7 @@ using Places = std::map<const CellRecord*, std::size_t>;
 const char* word(BreakEven::Kind kind) {
   switch (kind) {
     case BreakEven::Kind::first_sample:
-      return "cheaper until its first sample";
+      return "cheaper only before the first unbiased sample";
     case BreakEven::Kind::never_cheaper:
       return "never cheaper";
     case BreakEven::Kind::no_floor_seen:

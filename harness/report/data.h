@@ -10,11 +10,11 @@ namespace nullmark {
 
 struct ReportData {
   Json json;
-  std::vector<std::string> warnings;  ///< what could not be shown, and why
+  std::vector<std::string> warnings;  ///< what cannot be shown, and why
 };
 
-/// All that a report's page shows, every number computed: harness/report/report.md has the form.  `files` are the paths of the
-/// runs' results, `command` the words that asked for the report.
+/// All data of a report's page; report.md describes the format.  `files` are the paths of the results, `command` is the command
+/// line of the report.
 ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::string>& files, const std::string& baseline,
                        const std::string& command);
 

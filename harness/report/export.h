@@ -10,11 +10,11 @@ namespace nullmark {
 /// "google-benchmark", "csv", "jsonl", "junit".
 const std::vector<std::string>& export_formats();
 
-/// Results in another program's format; `file` is the results' path, which messages and reproduction commands name.
+/// Results in the format of another program; `file` is the path of the results, for messages and reproduction commands.
 ///
 ///   google-benchmark  one row per timed repetition, names estimator/medium/param:value; for compare.py
 ///   csv               one row per cell and channel, RFC 4180
-///   jsonl             one cell of the results file per line, with the word for it, its marks and what stands beside them
+///   jsonl             one cell of the results file per line, with its word, its marks and its reason
 ///   junit             one test case per cell: see junit.h
 std::string export_results(const RunRecord& run, const std::string& format, const std::string& file);
 

@@ -38,7 +38,7 @@ std::string quoted(const std::string& text) {
 std::string find_browser() {
   for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
     if (std::system(fmt::format("command -v {} >/dev/null 2>&1", name).c_str()) == 0) return name;
-  throw InputError("--figures: no Chromium is installed, which draws them; apt install chromium");
+  throw InputError("--figures: needs Chromium, which is not installed; apt install chromium");
 }
 
 /// The page after its scripts have run.
@@ -64,7 +64,8 @@ void expect_figures_possible(const std::string& folder) {
   fs::path there = fs::absolute(folder, error);
   while (!fs::exists(there, error) && there.has_relative_path()) there = there.parent_path();
   if (!fs::is_directory(there, error))
-    throw InputError(fmt::format("--figures: {}: {} is no folder; give a path where one can be", folder, there.string()));
+    throw InputError(
+        fmt::format("--figures: {}: {} is not a folder; give a path where one can be created", folder, there.string()));
   find_browser();
 }
 
@@ -73,7 +74,7 @@ std::size_t write_figures(const std::string& page_file, const std::string& folde
   const std::string_view open = "<script type=\"application/json\" id=\"figures\">", close = "</script>";
   const std::size_t begin = page.find(open), end = page.find(close, begin);
   if (begin == std::string::npos || end == std::string::npos)
-    throw InputError(fmt::format("--figures: Chromium drew nothing of {}; open it in a browser to see why", page_file));
+    throw InputError(fmt::format("--figures: Chromium drew no figures from {}; open it in a browser to see why", page_file));
   const Json figures = parse_json(page.substr(begin + open.size(), end - begin - open.size()), page_file);
   std::filesystem::create_directories(folder);
   for (const Json& figure : figures) {

@@ -4,11 +4,11 @@
 
 namespace nullmark {
 
-/// Throws InputError where the figures' folder cannot be one or no Chromium is found, before anything is done.
+/// Throws InputError if the folder of the figures cannot be created or Chromium is missing.  Call it before any work.
 void expect_figures_possible(const std::string& folder);
 
-/// Has a headless Chromium draw the main plots of a report's page and writes each as NAME.svg and NAME.png into a folder, which
-/// is made where it is missing; returns how many.  Throws InputError where no Chromium is found or it draws nothing.
+/// Draws the main plots of a report's page in a headless Chromium and writes each as NAME.svg and NAME.png into a folder, which
+/// it creates if needed.  Returns the number of plots.  Throws InputError if Chromium is missing or draws nothing.
 std::size_t write_figures(const std::string& page_file, const std::string& folder);
 
 }  // namespace nullmark

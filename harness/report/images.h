@@ -11,13 +11,13 @@ namespace nullmark {
 /// The pictures of a report, each once, as 16-bit numbers in base64 (harness/report/report.md).
 class ReportImages {
  public:
-  /// The pictures of a cell, by kind ("mean", "reference", "variance", "variance_theory", "lookups", "null_collisions"), as
-  /// places in json(); null where it has none or they are not beside the results file.  Channels are averaged.
+  /// The pictures of a cell as indices into json(), by kind ("mean", "reference", "variance", "variance_theory", "lookups",
+  /// "null_collisions"); null if it has none or they are not beside the results file.  Channels are averaged.
   Json add(const CellRecord& record, const std::string& results_file);
 
   const Json& json() const { return images_; }
 
-  /// Pictures of a results file that could not be read: the folder where they should be, and the reason.
+  /// Pictures of a results file that could not be read: the expected folder, and the reason.
   struct Missing {
     std::string folder, reason;
   };

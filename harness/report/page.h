@@ -6,8 +6,8 @@
 
 namespace nullmark {
 
-/// One HTML page that shows the data (harness/report/report.md) and needs nothing beside it: style, scripts and plotly.js with
-/// its licence are part of it.
+/// One self-contained HTML page that shows the data (harness/report/report.md), with style, scripts, and plotly.js and its
+/// licence.
 std::string report_page(const Json& data);
 
 }  // namespace nullmark

@@ -8,12 +8,12 @@
 
 namespace nullmark {
 
-/// The readable tables of a run: cells of one experiment, medium, majorant and quantity together, one line per estimator and
-/// channel, then the configuration's own tables beside the numbers they answer.  `*` marks theory shown in place of a sample
-/// value where the distribution has too heavy a tail for that to mean much (relative variance above kHeavyTail).
+/// The tables of a run: one table per experiment, medium, majorant and quantity, with one line per estimator and channel; then
+/// the tables of the configuration, with the published numbers.  `*` marks a value from theory, shown instead of the sample
+/// variance if the tail is too heavy (relative variance above kHeavyTail).
 std::string results_tables(const RunRecord& run);
 
-/// The configuration's own tables alone: title and lines, the first being the heading.
+/// Only the tables of the configuration: title and lines; the first line is the heading.
 std::vector<std::pair<std::string, std::vector<std::vector<std::string>>>> configured_tables(const RunRecord& run);
 
 }  // namespace nullmark

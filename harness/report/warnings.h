@@ -7,17 +7,17 @@
 
 namespace nullmark {
 
-/// "0.1.0 (0123abc)", of the program that made the results, as far as they say; and of this one.
+/// "0.1.0 (0123abc)": the version of the program that made the results, as far as they say; and of this one.
 std::string measured_by(const RunRecord& run);
 std::string this_version();
 
-/// One line where the results say that they are of another version than this program, whose verdicts and tables they get.
+/// One line if another version of the program made the results.
 std::optional<std::string> version_remark(const RunRecord& run);
 
-/// A timed thread that waited for a larger share of the wall time than this was kept from its core by other work.
+/// If a timed thread waited for a larger share of the wall time than this, other work had its core.
 inline constexpr Real kBusy = 0.05;
 
-/// One line where times were taken on a busy machine.
+/// One line if times were taken on a busy machine.
 std::optional<std::string> busy_remark(const RunRecord& run);
 
 }  // namespace nullmark

@@ -7,8 +7,8 @@
 
 namespace nullmark {
 
-/// Writes the pictures of a cell that asks for them, and names them in its record: mean, reference, variance, lookups and null
-/// collisions as PNG, all figures of all pixels as EXR.  Where that fails the observer is warned.
+/// If the cell has `images`, writes its pictures and names them in its record: mean, reference, variance, lookups and null
+/// collisions as PNG, all figures of all pixels as EXR.  If that fails, the observer gets a warning.
 void write_images(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled, const RunOptions& options,
                   const RunObserver& observer);
 

@@ -8,15 +8,15 @@
 
 namespace nullmark {
 
-/// What is known of a cell before anything is sampled.
+/// The record of a cell before sampling.
 CellRecord blank_record(const Plan& plan, const PreparedCell& prepared);
 
 void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled);
 
-/// Where samples are not finite or walks did not end, what is left of them has no say; references and theory stand.
+/// Drops the statistics of samples if some are not finite or walks did not end.  References and theory stay.
 void drop_sampled_statistics(CellRecord& record);
 
-/// The verdict, or why there is none.  A bias is one even where there is nothing to meet; a PASS is none.
+/// Adds the verdict, or why there is none.  If no ray meets any extinction, a proven bias is a verdict, a PASS is not.
 void add_verdict(CellRecord& record, const PreparedCell& prepared, const std::optional<VerdictRecord>& verdict);
 
 }  // namespace nullmark

@@ -6,14 +6,14 @@
 
 namespace nullmark {
 
-/// A part of a plan that meets every combination which the whole plan meets of
+/// A subset of a plan in which all of these combinations occur that occur in the whole plan:
 ///
 ///   estimator and medium type, medium type and majorant, estimator and depth (what a medium takes beside its box),
 ///   estimator, majorant and experiment
 ///
-/// Chosen greedily: the cell with the most combinations not met yet comes first, the earlier one of equals.  One entry a cell.
-/// Nothing but these names decides, so no result can bend the choice.  A fault that shows in combinations of more parts may be
-/// missed: the whole sweep is the proof, this part is the quick check.
+/// Chosen greedily: the cell with the most missing combinations comes next, the earlier one if equal.  One entry per cell.  The
+/// choice depends only on names, never on results.  The subset can miss a fault that needs a combination of more parts: the whole
+/// sweep is the proof, the subset a quick check.
 std::vector<bool> covering_cells(const Plan& plan);
 
 }  // namespace nullmark

@@ -7,13 +7,13 @@
 
 namespace nullmark {
 
-/// Writes values (row by row from the lowest row, `channels` 1 or 3 numbers a pixel) as an 8-bit PNG: 0 black, `maximum` white,
-/// cut beyond; values that are not finite are magenta.  `display` encodes with the transfer curve of sRGB (IEC 61966-2-1), as
-/// pictures of light want it.  Throws std::runtime_error when the file cannot be written.
+/// Writes values (row by row from the lowest row, `channels` 1 or 3 numbers per pixel) as an 8-bit PNG: 0 black, `maximum`
+/// and above white; values that are not finite are magenta.  `display` encodes with the transfer curve of sRGB (IEC 61966-2-1),
+/// for pictures of light.  Throws std::runtime_error when the file cannot be written.
 void write_png(const std::string& path, int width, int height, int channels, const std::vector<Real>& values, Real maximum,
                bool display = false);
 
-/// One layer of an image: a name and one number a pixel, row by row from the lowest row.
+/// One layer of an image: a name and one number per pixel, row by row from the lowest row.
 struct Layer {
   std::string name;
   std::vector<Real> values;
@@ -28,7 +28,7 @@ struct LayeredImage {
   std::vector<Layer> layers;
 };
 
-/// The channels of an OpenEXR file, all of which must be 32-bit floats of one number a pixel.  Throws std::runtime_error when it
+/// Reads the channels of an OpenEXR file; all must be 32-bit floats with one number per pixel.  Throws std::runtime_error when it
 /// cannot be read or is larger than 2^26 numbers.
 LayeredImage read_exr(const std::string& path);
 

@@ -50,8 +50,8 @@ void Journal::lock() {
   for (;;) {
     file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_APPEND, 0666);
     if (file_ < 0)
-      throw InputError(fmt::format("{}: cannot be written: {}; give an -o in a folder that is there and can be written", path_,
-                                   std::strerror(errno)));
+      throw InputError(
+          fmt::format("{}: cannot be written: {}; give -o a path in an existing, writable folder", path_, std::strerror(errno)));
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
       ::close(file_);
       throw InputError(path_ + ": another run is writing these results; wait for it or give another -o");
@@ -69,7 +69,7 @@ void Journal::read(const std::string& config_hash, Mode mode) {
     return;
   }
   if (mode == Mode::fresh)
-    throw InputError(path_ + ": left by a run that did not finish; --resume goes on from it, --force starts again");
+    throw InputError(path_ + ": left by a run that did not finish; --resume continues it, --force starts again");
 
   int number = 0;
   for (std::size_t begin = 0; begin < complete;) {

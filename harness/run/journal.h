@@ -7,31 +7,31 @@
 
 namespace nullmark {
 
-/// The cells of a run under way, one line each, beside the results file that will hold them: RESULTS.journal.  Every line reaches
-/// the disk before `append` returns, so a run that is killed loses at most the cells it was at.  The open journal is also the
-/// lock that keeps a second run off the same results.
+/// The finished cells of a running run, one line each, beside its future results file: RESULTS.journal.  Every line is on disk
+/// before `append` returns, so a killed run loses at most the cells in progress.  The open journal is also a lock against a
+/// second run with the same results file.
 class Journal {
  public:
   enum class Mode {
-    fresh,     ///< refuses a journal that is there
-    resume,    ///< goes on from a journal that is there
-    overwrite  ///< forgets a journal that is there
+    fresh,     ///< refuses an existing journal
+    resume,    ///< continues from an existing journal
+    overwrite  ///< discards an existing journal
   };
 
-  /// Throws InputError where another run holds the lock, the journal is of another configuration, or it is damaged elsewhere than
-  /// in its last line (which a kill may have torn, and which is then dropped).
+  /// Throws InputError if another run holds the lock, if the journal belongs to another configuration, or if it is damaged before
+  /// its last line.  A damaged last line, which a kill can leave, is dropped.
   Journal(const std::string& results_path, const std::string& config_hash, Mode mode);
-  /// Leaves the file for a later resume if it holds cells, removes it otherwise.
+  /// Keeps the file for a later resume if it holds cells, removes it otherwise.
   ~Journal();
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
-  /// What the journal held when it was opened; of a cell's lines the last counts.
+  /// Cells in the journal when it was opened; the last line of a cell counts.
   const std::vector<CellRecord>& cells() const { return cells_; }
 
   void append(const CellRecord& record);
 
-  /// To be called once the results file is in place.
+  /// Call once the results file is in place.
   void remove();
 
   static std::string path_for(const std::string& results_path) { return results_path + ".journal"; }

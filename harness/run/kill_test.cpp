@@ -298,7 +298,7 @@ TEST_F(Kill, DevicesAreNotReplaced) {
   for (const char* command : {"run small.json -o pipe", "run small.json -o pipe --force", "merge whole.json -o pipe --force"}) {
     if (!exists("whole.json")) undisturbed("small.json");
     EXPECT_EQ(run(command), static_cast<int>(ExitCode::input_error)) << command;
-    EXPECT_EQ(read("err"), "nullmark: pipe: is no regular file; expected the path of a file, or - for standard output\n");
+    EXPECT_EQ(read("err"), "nullmark: pipe: is not a regular file; expected the path of a file, or - for standard output\n");
     EXPECT_TRUE(std::filesystem::is_fifo(folder_ / "pipe")) << command;
     EXPECT_FALSE(exists("pipe.journal"));
   }

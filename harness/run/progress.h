@@ -8,7 +8,7 @@
 
 namespace nullmark {
 
-/// Tells on stderr how far a run is: a bar on a terminal (coloured unless NO_COLOR is set), elsewhere one line per cell.
+/// Shows the progress of a run on stderr: a bar on a terminal (coloured unless NO_COLOR is set), otherwise one line per cell.
 class Progress {
  public:
   Progress(std::size_t total);

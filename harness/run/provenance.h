@@ -9,15 +9,15 @@
 
 namespace nullmark {
 
-/// What a run was made with and on: source, compiler, machine, libraries, command; values are JSON texts.  No host name.
+/// Provenance of a run: source, compiler, machine, libraries, command; values are JSON texts.  No host name.
 struct RunContext {
   std::vector<std::string> command_line;
   int threads = 0;            ///< cores used
   std::string filter, shard;  ///< as given; empty: all cells
   bool covering = false;      ///< see covering.h
   std::size_t selected =
-      0;  ///< cells that the filter and the covering part pick, of all shards, and those that were there before
-  /// Time of the verdicts' evidence, and of all statistics, over that of the sampling.
+      0;  ///< cells that the filter and the covering subset select, over all shards, and cells that were there before
+  /// Time of the verdicts' evidence, and of all statistics, divided by that of the sampling.
   std::optional<double> verdict_share, statistics_share;
   std::vector<std::uint64_t> seeds;
   std::chrono::system_clock::time_point start = std::chrono::system_clock::now();

@@ -11,12 +11,12 @@
 
 namespace nullmark {
 
-/// Which sample of a cell.
+/// Selects a sample of a cell.
 struct SampleChoice {
   std::optional<std::uint64_t> ray, sample;
 };
 
-/// One sample of a cell, drawn again alone.
+/// One sample of a cell, drawn again on its own.
 struct Replay {
   std::string cell;
   std::uint64_t ray = 0, sample = 0;
@@ -24,27 +24,27 @@ struct Replay {
   Quantity quantity = Quantity::transmittance;
   Precision precision = Precision::float64;
   int channels = 1;
-  std::vector<std::string> outputs;          ///< what each value is
+  std::vector<std::string> outputs;          ///< names of the values
   std::vector<Real> values;                  ///< as drawn, before a measurement's clamp and quantisation
   std::vector<std::optional<Real>> targets;  ///< their means, where known
   std::uint32_t lookups = 0;
   std::vector<Real> draws;  ///< uniform numbers in [0, 1), in their order
-  /// Its one flight; without steps where it was a path, which flies many times, and in float, where registers write none down.
+  /// Its one flight.  Without steps for a path, which has many flights, and in float, where registers record none.
   Recording::Walk walk;
-  /// [step * channels + c]: the estimate of T up to each lookup, that included; empty of trackers that tell no profile.
+  /// [step * channels + c]: the estimate of T up to and including each lookup; empty for trackers without profiles.
   std::vector<Real> transmittance;
 };
 
-/// Draws a sample of a cell of the results again.  Where no sample is chosen it is the one that a mean suffers from most, among
-/// those that the record says were drawn, of all rays or of the chosen one: the first that is not finite, else the first of those
-/// farthest from their ray's target (from 0 where none is known).
+/// Draws a sample of a cell of the results again.  Without a choice it searches the drawn samples of all rays, or of the chosen
+/// ray, for the one that disturbs the mean most: the first that is not finite, else the first of those farthest from the target
+/// of their ray (from 0 if none is known).
 ///
-/// Throws InputError where the results hold no such cell, ray or configuration, or where the medium's data are others by now.
+/// Throws InputError if the results hold no such cell, ray or configuration, or if the medium's data have changed.
 Replay replay_sample(const RunRecord& run, const std::string& file, const std::string& cell, const SampleChoice& choice);
 
 /// With all digits; what is not finite is a string.
 Json replay_json(const Replay& replay);
-/// What the sample gave, over a table of its steps.
+/// The result of the sample, and a table of its steps.
 std::string replay_text(const Replay& replay);
 
 }  // namespace nullmark

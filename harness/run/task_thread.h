@@ -10,8 +10,8 @@
 
 namespace nullmark {
 
-/// Carries out tasks one after another, as they come, on a thread of its own: what waits for a disk holds up no samples.  A task
-/// that throws is the last.
+/// Runs tasks one after another, in order, on a separate thread, so that waiting for a disk does not delay samples.  A task that
+/// throws is the last.
 class Background {
  public:
   Background();
@@ -22,7 +22,7 @@ class Background {
   void add(std::function<void()> task);
   bool failed() const { return failed_; }
 
-  /// Waits for all tasks; throws what the last one threw.  No further ones may be added.
+  /// Waits for all tasks and rethrows what the last one threw.  No tasks may be added afterwards.
   void finish();
 
  private:

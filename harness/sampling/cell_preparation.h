@@ -11,15 +11,15 @@
 
 namespace nullmark {
 
-/// A cell with all that it samples from; `reason` is set where it cannot run.
+/// A cell and everything needed to sample it; `reason` is set if it cannot run.
 struct PreparedCell {
   const Cell* cell = nullptr;
   std::size_t index = 0;
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const Kernel> kernel;
   std::string reason;
-  std::vector<std::string> effects;  ///< of a radiance
-  bool takes_part = true;            ///< false: flights are closed forms, whatever the estimator
+  std::vector<std::string> effects;  ///< of a radiance kernel
+  bool takes_part = true;            ///< false: flights are closed forms, and the estimator is not used
   Targets targets;
   CellTheory theory;
   std::uint64_t samples_per_ray = 0;
@@ -34,13 +34,13 @@ struct PreparedCell {
   }
 };
 
-/// Builds media, majorant structures, rays and references once each, on demand.
+/// Builds media, majorant structures, rays and references on demand, each once.
 class CellPreparer {
  public:
   explicit CellPreparer(const Plan& plan) : plan_(plan) {}
 
-  /// A cell of the plan, by its place there, all but its theory.  Throws ParameterError (with a JSON pointer as `parameter`) for
-  /// specifications that do not fit their medium.
+  /// Prepares a cell by its index in the plan, without its theory.  Throws ParameterError (with a JSON pointer as `parameter`)
+  /// for specifications that do not fit their medium.
   PreparedCell prepare(std::size_t index);
 
  private:
@@ -53,19 +53,19 @@ class CellPreparer {
   std::map<std::size_t, std::string> missing_;
   std::map<std::size_t, std::shared_ptr<const BuiltMedium>> media_;
   std::map<std::array<std::size_t, 2>, std::shared_ptr<const BuiltMajorant>> structures_;
-  std::vector<std::vector<SurfaceSpec>> cuts_;  ///< that end rays
+  std::vector<std::vector<SurfaceSpec>> cuts_;  ///< surfaces that end rays
   std::map<std::array<std::size_t, 3>, std::shared_ptr<const BuiltRays>> rays_;
   std::map<std::array<std::size_t, 3>, std::shared_ptr<const Reference>> references_;
   std::map<std::array<std::size_t, 4>, std::shared_ptr<const Marks>> marks_;
   std::map<std::array<std::size_t, 5>, std::shared_ptr<const Scene>> scenes_;
-  std::map<const Scene*, Real> deepest_;  ///< majorant depth of a ray, where it was asked for
+  std::map<const Scene*, Real> deepest_;  ///< largest majorant depth of a ray, if it was needed
 };
 
-/// The cells of a plan that `wanted` picks, by their place there.
+/// Prepares the cells of a plan for whose index `wanted` is true.
 std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted);
 
-/// Theory of all cells that can run, scene by scene; a measurement stage changes the law of the samples, so those cells have
-/// none. Where samples are planned by lookups, their number follows from it.
+/// Adds theory to all cells that can run, scene by scene.  Cells with a measurement get none, because it changes the law of the
+/// samples.  With equal_lookups, the number of samples follows from the theory.
 void add_theory(std::vector<PreparedCell>& cells);
 
 }  // namespace nullmark

@@ -8,26 +8,26 @@
 
 namespace nullmark {
 
-/// Values of some samples of a cell, as its run drew them: the first 16 of ray 0, and of up to 2048 rays, evenly spaced, some
-/// that are evenly spaced from the ray's first sample to its last.  About one sample in 128, at least 32 and at most 4096 a cell.
+/// Values of some samples of a cell, as its run drew them: the first 16 of ray 0, and evenly spaced samples of up to 2048 evenly
+/// spaced rays.  About one sample in 128, at least 32 and at most 4096 per cell.
 ///
-/// Threads may keep samples of different rays, or of different parts of one ray, at the same time.
+/// Threads may concurrently keep samples of different rays, or of different parts of one ray.
 class KeptSamples {
  public:
   KeptSamples() = default;
-  /// Of samples first .. first + per_ray - 1 of every ray.
+  /// For samples first .. first + per_ray - 1 of every ray.
   KeptSamples(std::size_t rays, std::uint64_t first, std::uint64_t per_ray, std::size_t outputs);
 
-  /// Takes those that are to be kept out of samples from .. from + count - 1 of a ray; values[i * outputs + o].
+  /// Selects what to keep from samples from .. from + count - 1 of a ray; values[i * outputs + o].
   void keep(std::size_t ray, std::uint64_t from, std::uint64_t count, std::span<const Real> values);
 
   struct Sample {
     std::size_t ray;
-    std::uint64_t number;  ///< of the sample, as its random stream is addressed
+    std::uint64_t number;  ///< sample index in the address of its random stream
     std::span<const Real> values;
   };
   std::size_t count() const { return opening_ + rays_ * each_; }
-  /// In the order of rays, and of samples in each; ray 0's first 16 before the others.
+  /// By ray, then by sample; the first 16 of ray 0 come first.
   Sample at(std::size_t i) const;
 
  private:

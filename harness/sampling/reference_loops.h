@@ -37,15 +37,15 @@ class PlainRng {
   std::uint64_t s_[4];
 };
 
-/// Random number, logarithm and advance, nothing else: the least a tentative collision can cost in scalar double.
+/// Random number, logarithm and advance only: the least cost of a tentative collision in scalar double.
 inline Real floor_loop(PlainRng& rng, Real inverse_rate, std::uint64_t steps) {
   Real t = 0;
   for (std::uint64_t i = 0; i < steps; ++i) t -= std::log(1 - rng.uniform()) * inverse_rate;
   return t;
 }
 
-/// The same in registers of this build's width, with an exponential and a second random number where asked: the least that
-/// `steps` tentative collisions, a multiple of the lanes, can cost.
+/// The same in registers of this build's width, optionally with an exponential and a second random number: the least cost of
+/// `steps` tentative collisions, a multiple of the lanes.
 template <class T, bool with_exponential = false, bool with_number = false>
 Real lane_floor_loop(typename LaneRng<T, kNativeLanes<T>>::State& streams, Real inverse_rate, std::uint64_t steps) {
   using Pack = Lanes<T, kNativeLanes<T>>;
@@ -61,8 +61,7 @@ Real lane_floor_loop(typename LaneRng<T, kNativeLanes<T>>::State& streams, Real 
   return lanes[0];
 }
 
-/// Reads of one number from random cache lines of a buffer, none waiting for another: the least that a lookup in so much memory
-/// can cost.
+/// Independent reads of one number from random cache lines of a buffer: the least cost of a lookup in this much memory.
 inline float memory_floor_loop(const std::vector<float>& buffer, std::uint64_t& at, std::uint64_t reads) {
   constexpr std::uint64_t kLine = 64 / sizeof(float), kStep = 0x9e3779b97f4a7c15;
   const std::uint64_t lines = buffer.size() / kLine;
@@ -75,7 +74,7 @@ inline float memory_floor_loop(const std::vector<float>& buffer, std::uint64_t& 
   return sum;
 }
 
-/// Ratio tracking as one would write it by hand for one ray of length 1 and one medium; adds its lookups to `lookups`.
+/// Hand-written ratio tracking for one ray of length 1 and one medium; adds its lookups to `lookups`.
 template <class Extinction>
 Real plain_ratio_loop(PlainRng& rng, Real majorant, const Extinction& extinction, std::uint64_t& lookups) {
   const Real inverse = 1 / majorant;

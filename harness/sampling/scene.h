@@ -11,7 +11,7 @@
 
 namespace nullmark {
 
-/// A medium, built, with its extrema and what its random streams are keyed by.
+/// A built medium, with its extrema and the hash that keys its random streams.
 struct BuiltMedium {
   std::shared_ptr<const Medium> medium;
   Extrema extrema;
@@ -20,19 +20,19 @@ struct BuiltMedium {
   std::uint64_t hash = 0;  ///< of the specification and of the data behind it
 };
 
-/// A value for all channels or one each, as many as there are; none: 0.  Throws ParameterError, naming `what`.
+/// One value for all channels or one each; none: 0.  Throws ParameterError that names `what` if the number does not fit.
 Spectrum per_channel(const std::vector<Real>& values, int channels, const char* what);
 
 /// Builds a specification: the field, times its spectrum or one per channel.  Throws ParameterError or MissingData.
 BuiltMedium build_medium(const MediumSpec& spec);
 
-/// A majorant structure, with the wall time that building it took.
+/// A majorant structure, and the wall time of building it.
 struct BuiltMajorant {
   std::shared_ptr<const MajorantStructure> structure;
   double build_seconds = 0;
 };
 
-/// Throws ParameterError where the structure does not fit the medium.
+/// Throws ParameterError if the structure does not fit the medium.
 BuiltMajorant build_majorant(const Component& spec, const BuiltMedium& medium);
 
 /// Rays of a set, cut to a medium, in both frames.
@@ -54,39 +54,39 @@ struct Reference {
 };
 Reference compute_reference(const BuiltMedium& medium, const BuiltRays& rays);
 
-/// Distances on every ray with the exact optical depth from the ray's begin to each, and a bound on its error.
+/// Distances on every ray, with the exact optical depth from the begin of the ray to each and a bound on its error.
 struct Marks {
   std::size_t per_ray = 0;
   std::vector<Real> distance;      ///< [ray * per_ray + j], ascending
   std::vector<Real> depth, error;  ///< [(ray * per_ray + j) * channels + c]
 };
 
-/// kProfileMarks marks at equal distances up to the ray's end (transmittance_profile), or the kFreePathCells + 1 ends of cells in
-/// which a collision is about equally probable (free_path).
+/// For transmittance_profile: kProfileMarks equidistant marks up to the end of the ray.  For free_path: the kFreePathCells + 1
+/// ends of cells in which a collision is about equally probable.
 Marks compute_marks(const BuiltMedium& medium, const BuiltRays& rays, Quantity quantity);
 
-/// What one cell samples from: shared by all cells of the same medium, majorant and rays.
+/// Medium, majorant and rays of a cell, shared by all cells that have the same.
 struct Scene {
   std::shared_ptr<const BuiltMedium> medium;
   std::shared_ptr<const BuiltMajorant> majorant;
   std::shared_ptr<const BuiltRays> rays;
   std::shared_ptr<const Reference> reference;
-  std::shared_ptr<const Marks> marks;  ///< of quantities that are told at distances; null otherwise
+  std::shared_ptr<const Marks> marks;  ///< for quantities at distances along the ray; null otherwise
   bool bounding = true;                ///< the majorant bounds the extinction in every segment of every ray
   bool exceeds_bound = false;          ///< the extinction was seen above the majorant at a point of a ray
 
-  /// Fills the context of a ray with what the kernel needs.
+  /// Prepares a ray with everything that the kernel needs.
   void context(std::size_t ray, const Kernel& kernel, PreparedRay& out) const;
 };
 
 /// Whether the majorant bounds the extinction in every segment of every ray.
 bool bounds_everywhere(const MajorantStructure& majorant, const BuiltRays& rays);
 
-/// Whether the extinction exceeds the majorant at one of several points of every piece between the medium's knots and the
-/// segments' ends: then it does not bound, whatever samples happen to meet.
+/// Whether the extinction exceeds the majorant at one of several points of each piece between the medium's knots and the ends of
+/// segments.  Then the majorant is not a bound, whatever the samples see.
 bool exceeds_somewhere(const BuiltMedium& medium, const MajorantStructure& majorant, const BuiltRays& rays);
 
-/// Key of the random streams: the same for all estimators of a medium and seed, unless the cell asks for streams of its own.
+/// Key of the random streams: the same for all estimators on a medium with one seed, unless the cell has `own_streams`.
 std::uint64_t stream_key(const Cell& cell, const BuiltMedium& medium);
 
 }  // namespace nullmark

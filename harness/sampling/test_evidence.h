@@ -14,11 +14,11 @@ namespace nullmark {
 /// Evidence of one test so far.
 struct Evidence {
   std::vector<Real> logs;    ///< bet after bet, rate after rate
-  std::uint64_t errors = 0;  ///< how many there were
+  std::uint64_t errors = 0;  ///< number of errors
   Real total_error = 0;
   Real largest_error = 0;
 
-  /// Bets those that take sums of so many errors on these.
+  /// Applies the bets that take sums of this many errors to these sums.
   void bet(const MeanTest& test, int errors_per_sum, std::span<const Real> sums);
   Evidence& operator+=(const Evidence& other);
 };
@@ -26,11 +26,11 @@ struct Evidence {
 /// The figures of a test, ready for the record.
 TestRecord test_record(const MeanTest& test, const Evidence& evidence);
 
-/// Errors on their way to the tests of a plan: summed in runs of 2, 4, ... as the bets ask for, gathered over rays, and bet on by
-/// the thousand.
+/// Collects errors for the tests of a plan: sums them in runs of 2, 4, ... as the bets require, gathers the sums over rays, and
+/// bets on thousands of them at once.
 class EvidenceAccumulator {
  public:
-  /// Kept from chunk to chunk: fresh pages cost more than what is written to them.
+  /// Reused from chunk to chunk, because fresh pages cost more than writing to them.
   struct Memory {
     std::vector<std::vector<std::vector<Real>>> pending;  ///< by test and length of its sums
     std::vector<std::vector<Real>> sums;                  ///< by length
@@ -39,14 +39,14 @@ class EvidenceAccumulator {
     static Memory& of_variances();
   };
 
-  /// Evidence of `tests`, which are those of the mean or of the variance in `plan`, is added to `out`, by test.
+  /// Adds the evidence of `tests` to `out`, by test.  `tests` are the mean or the variance tests of `plan`.
   EvidenceAccumulator(const TestPlan* plan, std::span<const MeanTest> tests, std::size_t channels, Memory& memory,
                       std::map<std::size_t, Evidence>& out);
 
   void add_errors(std::size_t ray, std::size_t channel, std::span<const Real> errors);
   void add_lookups(std::size_t ray, std::span<const std::uint32_t> lookups);
 
-  /// Bets what is left.
+  /// Bets on the remaining errors.
   void finish();
 
  private:

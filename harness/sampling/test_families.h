@@ -6,15 +6,15 @@
 
 namespace nullmark {
 
-/// Claims that the mean tests of a whole configuration make, two each, channel by channel and group by group, whatever is
-/// selected to run; and those of its lookups tests.
+/// Number of claims of all mean tests of a configuration, two per channel and group, whatever is selected to run; and the number
+/// for its lookup tests.
 std::uint64_t mean_family(const Plan& plan);
 std::uint64_t lookups_family(const Plan& plan);
 
-/// Laws that a whole configuration may test.
+/// Number of laws that a whole configuration can test.
 std::uint64_t laws_family(const Plan& plan);
 
-/// How many laws a cell can be tested for, at most.
+/// Largest number of laws that a cell can be tested for.
 inline constexpr std::uint64_t kLaws = 11;
 
 }  // namespace nullmark

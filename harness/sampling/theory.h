@@ -8,21 +8,21 @@
 
 namespace nullmark {
 
-/// Exact moments of a cell over its rays, where the estimator states them.
+/// Exact moments of a cell over its rays, if the estimator states them.
 struct CellTheory {
   std::vector<std::optional<Real>> variance;      ///< per output, averaged over rays
   std::vector<std::optional<Real>> squared_bias;  ///< per output, mean over rays of (mean - reference)^2
   std::vector<std::optional<Real>> bias;
   std::optional<Real> lookups;  ///< averaged over rays
-  Real majorant_depth = 0;      ///< averaged over rays: the lookups to reckon with where none are stated
-  bool unit_weights = false;    ///< of a free path: its weight is always 1
-  /// Per ray and output; empty where not known for all.  Variance of a sample; the estimator's own mean minus the target.
+  Real majorant_depth = 0;      ///< averaged over rays: an estimate of the lookups if none are stated
+  bool unit_weights = false;    ///< for a free path: its weight is always 1
+  /// Per ray and output; empty unless known for all: variance of a sample; the estimator's own mean minus the target.
   std::vector<Real> ray_variance, ray_shift;
-  bool infinite_variance = false;                       ///< stated of some ray: no sample variance is to be trusted
-  std::vector<Real> ray_lookups, ray_lookups_variance;  ///< per ray; empty where not known for all
+  bool infinite_variance = false;                       ///< stated for some ray: no sample variance can be trusted
+  std::vector<Real> ray_lookups, ray_lookups_variance;  ///< per ray; empty unless known for all
 };
 
-/// Theory of several kernels over one scene: each ray's profile is made once for all of them.
+/// Theory of several kernels over one scene; the profile of each ray is computed once for all of them.
 struct TheoryQuery {
   const Kernel* kernel = nullptr;
   Quantity quantity = Quantity::transmittance;

@@ -15,13 +15,13 @@ struct TimedCell {
   const Kernel* kernel = nullptr;
 };
 
-/// Share of the wall time in which a thread did not run, for other work had its core; 0 where its clock went ahead of the wall's,
-/// as clocks may by as little as they resolve.
+/// Share of the wall time in which a thread did not run, because other work had its core.  0 if its clock was ahead of the wall
+/// clock, which happens within the resolution of clocks.
 Real waiting_share(Real wall_seconds, Real thread_seconds);
 
 /// Wall time of every cell's kernel, traversal included, on one thread, with Google Benchmark: repetitions of all cells and of
-/// two calibration loops are interleaved at random, medians and median absolute deviations are taken over them.  `done` is told
-/// of each repetition.  Stops between repetitions once `stop` answers true; unfinished cells keep no time.
+/// two calibration loops are interleaved at random, medians and median absolute deviations are taken over them.  `done` is called
+/// for each repetition.  Stops between repetitions once `stop` returns true; unfinished cells get no time.
 std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& plan,
                                                   const std::function<bool()>& stop, const std::function<void(double)>& progress);
 

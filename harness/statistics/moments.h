@@ -11,13 +11,13 @@
 
 namespace nullmark {
 
-/// Power sums of the errors x - reference of one ray and channel.  Shifting by the reference keeps the variance accurate however
-/// small it is beside the mean; sums of shards add.
+/// Power sums of the errors x - reference of one ray and channel.  Subtracting the reference keeps the variance accurate even if
+/// it is small beside the mean.  Sums of shards add.
 struct Moments {
   Real s1 = 0, s2 = 0, s3 = 0, s4 = 0;
   std::uint64_t count = 0;
 
-  /// Summed in eight lanes on every machine, so that the last digits do not tell its registers' width.
+  /// Sums in eight lanes on every machine, so the last digits do not depend on the width of its registers.
   void add(std::span<const Real> errors);
 
   Moments& operator+=(const Moments& other) {
@@ -40,13 +40,13 @@ struct Moments {
   }
 };
 
-/// Squared errors of sixteen disjoint parts of a cell's samples.  Which part a sample belongs to follows from rays and samples
-/// alone, so that estimators on the same streams have parts that go together.
+/// Squared errors of sixteen disjoint parts of a cell's samples.  The part of a sample depends only on the numbers of rays and
+/// samples, so parts of estimators with the same streams can be paired.
 struct BlockErrors {
   static constexpr std::size_t kBlocks = 16;
 
-  /// The next errors of a ray, which are added to its moments as well: a run of them to each block, or all to that of the ray
-  /// where they are few.
+  /// Adds the next errors of a ray, which are added to its moments as well: consecutive errors to each block, or all to the block
+  /// of the ray if they are few.
   void add(std::size_t ray, std::span<const Real> errors, Moments& moments);
 
   BlockErrors& operator+=(const BlockErrors& other) {
@@ -61,8 +61,8 @@ struct BlockErrors {
   std::array<std::uint64_t, kBlocks> count{};
 };
 
-/// Squared errors of the means of 1, 2, 4, ... consecutive samples, over all disjoint groups of each size.  Groups of one ray
-/// only; `finish_ray` drops the incomplete ones.
+/// Squared errors of the means of 1, 2, 4, ... consecutive samples, over all disjoint groups of each size.  A group has samples
+/// of one ray only; `finish_ray` drops incomplete groups.
 class GroupErrors {
  public:
   struct Level {
@@ -70,10 +70,10 @@ class GroupErrors {
     std::uint64_t groups = 0;
   };
 
-  /// The next errors of a ray: the same power of two each time, but for the last, which may be fewer.
+  /// Adds the next errors of a ray.  Their number is the same power of two each time; the last call may have fewer.
   void add(std::span<const Real> errors);
 
-  /// A complete group of 2^level samples whose errors sum to `sum`; a binary counter adds it up with those before it.
+  /// Adds a complete group of 2^level samples whose errors sum to `sum`; a binary counter combines it with earlier groups.
   void carry(std::size_t level, Real sum) {
     for (;; ++level) {
       reach(level);
@@ -101,7 +101,7 @@ class GroupErrors {
     return *this;
   }
 
-  /// Takes the levels above `level` from another set, whose groups start there.
+  /// Takes the levels above `level` from another set whose groups start there.
   void append_above(std::size_t level, const GroupErrors& other) {
     for (std::size_t i = level + 1; i < other.levels_.size(); ++i) {
       reach(i);

@@ -7,31 +7,31 @@
 
 namespace nullmark {
 
-/// What a cell amounts to, as `check` counts it.
+/// The kind of a cell in the totals of `check`.
 enum class Kind { pass, fail, expected_open, unexpected_open, violated, error, not_run, unclaimed };
 Kind kind_of(const CellRecord& record);
 
-/// The outcome of the mean, against whatever it was judged.
+/// The outcome of the mean, judged against the reference or the own mean.
 Outcome mean_of(const VerdictRecord& verdict);
 
-/// What a verdict rests on or leaves open.
+/// What a verdict rests on, or leaves untested.
 ///
 ///   pilot          the proof takes the variance that a pilot of the same tracker measured
-///   own_mean       judged against the mean that the tracker predicts of itself
+///   own_mean       judged against the mean that the tracker predicts for itself
 ///   laws           the mean is undecided; laws of the walks were tested, and none is broken
 ///   bound          the majorant is not known to bound the extinction
 ///   depth          the tracker is handed the exact optical depth
-///   part_of_depth  the same, and so much of its answer follows that depth (CellRecord::reliance)
+///   part_of_depth  the same, and a measured share of its answer follows that depth (CellRecord::reliance)
 ///   law            the claims rest on a law that was not tested
 enum class Mark { pilot, own_mean, laws, bound, depth, part_of_depth, law };
 
-/// The marks of a cell whose mean passed, failed or is undecided, in the order of the enumeration; of others none.
+/// The marks of a cell whose mean passed, failed or is undecided, in the order of the enumeration; none for other cells.
 std::vector<Mark> marks_of(const CellRecord& record);
 
-/// A mark as totals count it: "by pilot".
+/// The name of a mark, as in totals: "by pilot".
 const char* mark_name(Mark mark);
 
-/// The marks as a cell shows them, figures included: "leans on the exact depth (0.25 of its answer)".
+/// The marks of a cell, with figures: "leans on the exact depth (0.25 of its answer)".
 std::vector<std::string> mark_texts(const CellRecord& record);
 
 /// "PASS", "INCONCLUSIVE (as planned)".
@@ -40,10 +40,10 @@ const char* verdict_word(Kind kind);
 /// The word for a cell with its marks, the same in every output: "PASS (by pilot, own mean)".
 std::string marked_word(const CellRecord& record);
 
-/// Why a cell is not PASS: of its status, its verdict, lookups above the bound and laws; what fails comes first.
+/// Why a cell is not PASS: from its status, verdict, lookups above the bound, and laws.  What fails comes first.
 std::string reason_of(const CellRecord& record);
 
-/// What stands beside the word: of a PASS what it proves, of others the reason.
+/// The text beside the word: what a PASS proves, or the reason of any other word.
 std::string finding_of(const CellRecord& record);
 
 }  // namespace nullmark

@@ -7,20 +7,20 @@
 
 namespace nullmark {
 
-/// Convergence order of a consistent estimator, fitted over cells that differ in nothing but their number of steps.
+/// Convergence order of a consistent estimator, fitted over cells that differ only in their number of steps.
 struct OrderFit {
-  std::string name;                             ///< the cells' name with the steps left out
+  std::string name;                             ///< the cells' name without the steps
   Real claimed = 0, order = 0, half_width = 0;  ///< interval at the given quantile of the normal law
-  std::vector<int> steps;                       ///< that resolve their bias
+  std::vector<int> steps;                       ///< numbers of steps whose bias is resolved
   Outcome outcome = Outcome::inconclusive;
   std::string reason;
 };
 
-/// log |bias| against log(1/steps), weighted by the biases' standard errors; of T the bias is that of the optical depth,
-/// log(mean/T).  Only biases beyond 4 standard errors and 10 times the reference's error count; fewer than three step counts of
-/// them resolve no order, nor do biases that follow no power law.  FAIL: the whole interval lies below the claim by more than a
-/// quarter; PASS: none of it does.  (A bias that vanishes faster than claimed is no fault: midpoints are exact on linear media.)
-/// Measured cells (clamped, quantised) claim no order.
+/// Fits log |bias| against log(1/steps), weighted by the standard errors of the biases.  For T the bias is that of the optical
+/// depth, log(mean/T).  Only biases beyond 4 standard errors and 10 times the reference's error count.  An order needs three such
+/// numbers of steps, and biases that follow a power law.  FAIL: the whole interval lies below the claim by more than a quarter.
+/// PASS: none of it does.  A bias that vanishes faster than claimed is no fault: midpoints are exact on linear media.  Cells with
+/// a measurement (clamped, quantised) claim no order.
 std::vector<OrderFit> fit_orders(const std::vector<CellRecord>& cells);
 
 }  // namespace nullmark

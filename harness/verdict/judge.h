@@ -12,7 +12,7 @@
 
 namespace nullmark {
 
-/// What verdicts and all statistics cost beside the sampling they are of, and the walks that did not end.
+/// Time of verdicts and of all statistics beside the sampling, and the number of walks that did not end.
 struct Effort {
   double judging = 0, statistics = 0, working = 0;
   std::uint64_t overruns = 0;
@@ -32,23 +32,23 @@ struct Effort {
   }
 };
 
-/// Sizes of the families that a verdict's levels are shared out over.
+/// Sizes of the families over which the levels of a verdict are divided.
 struct Families {
   std::uint64_t means = 1, lookups = 1, laws = 1;
 };
 
-/// Why a cell has no verdict; empty where it has one.
+/// Why a cell has no verdict; empty if it has one.
 std::string why_not_judged(const PreparedCell& prepared);
 
-/// Any tracker is right where there is nothing to meet.  Light may still meet surfaces.
+/// Whether no ray meets any extinction.  Then any tracker is right.  Light can still meet surfaces.
 bool tests_nothing(const PreparedCell& prepared);
 
-/// The tests of a cell; nothing for cells that claim nothing that could be tested.  Where theory has no variance a pilot is
-/// drawn, and some of its samples are kept.
+/// The tests of a cell; nothing if it claims nothing that can be tested.  If theory states no variance, a pilot is drawn, and
+/// some of its samples are kept.
 std::optional<TestPlan> tests_of(const PreparedCell& prepared, const TestLevels& levels, std::vector<KeptSamples>& kept,
                                  const std::function<bool()>& stop);
 
-/// Looks at the evidence of the first samples and draws further ones while the verdict is open.  Nothing where interrupted.
+/// Judges the evidence of the first samples, and draws more while the verdict is open.  Nothing if interrupted.
 std::optional<VerdictRecord> judge(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,
                                    std::span<const KeptSamples> kept, const ErrorRates& levels, const Families& families,
                                    Effort& effort, const std::function<bool()>& stop,

@@ -50,7 +50,7 @@ KdCut best_kd_cut(const BoundLattice& lattice, const Block& block, Real loosenes
 
 struct KdTreeSource final : MajorantSource {
   static constexpr const char* kName = "kd_tree";
-  static constexpr const char* kSummary = "a kd-tree of bounds, cut where lookups saved exceed crossings added";
+  static constexpr const char* kSummary = "a kd-tree of bounds, cut where the saved lookups outweigh the added crossings";
   static constexpr const char* kSource = "Yue et al. 2010; Yue et al. 2011 for the cost in three dimensions";
 
   int resolution = 64, resolution_y = 0, resolution_z = 0;

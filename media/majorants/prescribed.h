@@ -44,7 +44,7 @@ class PrescribedMajorant final : public MajorantStructure {
 
 struct PrescribedMajorantSource final : MajorantSource {
   static constexpr const char* kName = "prescribed";
-  static constexpr const char* kSummary = "a given rate, constant or affine in space, taken as it is";
+  static constexpr const char* kSummary = "a given rate, constant or affine in space, whether or not it is a bound";
   static constexpr const char* kSource = "Kozelj, Comparison of transmittance and distance estimators (majorant 5 + 95 y)";
 
   Real value = 1;

@@ -35,7 +35,7 @@ class RayMaximumMajorant final : public MajorantStructure {
 
 struct RayMaximumSource final : MajorantSource {
   static constexpr const char* kName = "ray_maximum";
-  static constexpr const char* kSummary = "each ray's own maximum over an efficiency that changes along y";
+  static constexpr const char* kSummary = "the maximum along each ray, divided by an efficiency that changes along y";
   static constexpr const char* kSource = "Novak et al. 2014 and Georgiev et al. 2019, canonical maps";
 
   Real from = 0.1, to = 1;
