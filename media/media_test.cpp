@@ -1,162 +1,26 @@
+// What every procedural medium promises: its formula, bounds, average, optical depth, knots.
+
+#include "media/media_test.h"
+
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <boost/math/quadrature/gauss.hpp>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <boost/math/special_functions/legendre.hpp>
-#include <functional>
-#include <map>
-#include <numbers>
+#include <cmath>
+#include <limits>
 #include <random>
-#include <set>
-#include <variant>
+#include <utility>
+#include <vector>
 
-#include "media/base/registry.h"
-#include "media/fractal_noise.h"
+#include "media/media_cases_test.h"
 
 namespace nullmark {
 namespace {
 
-using Setting = std::variant<Real, int, std::string, std::vector<Real>, Vec3>;
-using Settings = std::map<std::string, Setting>;
-
-/// Writes settings into a source's parameters by name, as the configuration reader does.
-class Setter final : public ParameterVisitor {
- public:
-  explicit Setter(Settings settings) : settings_(std::move(settings)) {}
-  void number(const char* name, Real& value, Range range, const char*, const char*) override {
-    set(name, value);
-    EXPECT_TRUE(range.contains(value)) << name << " = " << value;
-  }
-  void integer(const char* name, int& value, int low, int high, const char*) override {
-    set(name, value);
-    EXPECT_TRUE(low <= value && value <= high) << name << " = " << value;
-  }
-  void flag(const char*, bool&, const char*) override { ADD_FAILURE() << "no medium here has flags"; }
-  void choice(const char* name, std::string& value, std::initializer_list<const char*> allowed, const char*) override {
-    set(name, value);
-    EXPECT_TRUE(std::any_of(allowed.begin(), allowed.end(), [&](const char* a) { return value == a; })) << name;
-  }
-  void text(const char*, std::string&, const char*) override { ADD_FAILURE() << "no medium here has texts"; }
-  void numbers(const char* name, std::vector<Real>& value, int, int, Range range, const char*, const char*) override {
-    set(name, value);
-    for (const Real x : value) EXPECT_TRUE(range.contains(x)) << name;
-  }
-  void point(const char* name, Vec3& value, const char*, const char*) override { set(name, value); }
-
-  /// Names that no parameter has asked for.
-  const Settings& left() const { return settings_; }
-
- private:
-  template <class T>
-  void set(const char* name, T& value) {
-    const auto at = settings_.find(name);
-    if (at == settings_.end()) return;
-    value = std::get<T>(at->second);
-    settings_.erase(at);
-  }
-  Settings settings_;
-};
-
-std::shared_ptr<const Medium> make(const std::string& type, const Settings& settings = {}) {
-  const MediumEntry* entry = Registry<MediumEntry>::instance().find(type);
-  if (entry == nullptr) throw std::runtime_error("not registered: " + type);
-  const auto source = entry->make();
-  Setter setter(settings);
-  source->parameters(setter);
-  EXPECT_TRUE(setter.left().empty()) << type << " has no parameter " << setter.left().begin()->first;
-  return source->build();
-}
-
-struct Case {
-  std::string name;
-  std::string type;
-  Settings settings;
-  /// mu at fractions s of the box, written down a second time in long double; may be empty.
-  std::function<long double(const std::array<long double, 3>&)> formula;
-  bool exact = true;   ///< extrema are attained in the box (up to rounding)
-  bool jumps = false;  ///< extinction has steps
-  bool closed = true;  ///< optical_depth exists
-  Real average_error = 1e-12;
-};
-
-std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
-
-const Vec3 kLo(-1.5, 2, 0.25), kHi(0.75, 2.5, 4);
-
-long double normal(long double s, long double sigma = .05L) { return std::exp(-(s - .32L) * (s - .32L) / (2 * sigma * sigma)); }
-
-std::vector<Case> cases() {
-  using P = std::array<long double, 3>;
-  using Numbers = std::vector<Real>;
-  const auto in_box = [](Settings s) {
-    s["lo"] = kLo;
-    s["hi"] = kHi;
-    return s;
-  };
-  std::vector<Case> all;
-  const auto add = [&](std::string name, std::string type, Settings s, std::function<long double(const P&)> f) -> Case& {
-    all.push_back({std::move(name), std::move(type), std::move(s), std::move(f)});
-    return all.back();
-  };
-  add("homogeneous", "homogeneous", in_box({{"extinction", 2.5}}), [](const P&) { return 2.5L; });
-  add("vacuum", "homogeneous", {{"extinction", 0.}}, [](const P&) { return 0.L; });
-  add("linear", "linear", in_box({{"begin", 3.}, {"end", 0.5}, {"axis", "z"}}), [](const P& s) { return 3 - 2.5L * s[2]; });
-  add("parabola", "polynomial", {}, [](const P& s) { return s[0] * s[0]; });
-  add("cubic", "polynomial", in_box({{"coefficients", Numbers{0.5, -3, 9, -6}}, {"axis", "y"}}),
-      [](const P& s) { return .5L + s[1] * (-3 + s[1] * (9 - 6 * s[1])); });
-  add("touching_quadratic", "polynomial", {{"coefficients", Numbers{1. / 9, -2. / 3, 1}}}, [](const P& s) {
-    return std::max(0.L, static_cast<long double>(1. / 9) + s[0] * (static_cast<long double>(-2. / 3) + s[0]));
-  });
-  add("constant_polynomial", "polynomial", {{"coefficients", Numbers{0.75}}}, [](const P&) { return .75L; });
-  add("exponential", "exponential", in_box({{"axis", "y"}}), [](const P& s) { return 3 * std::exp(-3 * s[1]); });
-  add("steep_exponential", "exponential", {{"amplitude", 1e-3}, {"rate", 12.}},
-      [](const P& s) { return static_cast<long double>(1e-3) * std::exp(12 * s[0]); });
-  add("flat_exponential", "exponential", {{"rate", 1e-14}}, [](const P& s) { return 3 * std::exp(1e-14L * s[0]); });
-  add("rate_0", "exponential", {{"rate", 0.}}, [](const P&) { return 3.L; });
-  add("cube", "exponential_cube", {}, [](const P& s) { return -std::log(s[0]); });
-  add("cube_part", "exponential_cube", in_box({{"x0", 0.25}, {"x1", 0.875}, {"axis", "z"}}),
-      [](const P& s) { return -std::log(.25L + .625L * s[2]); });
-  add("cube_reversed", "exponential_cube", {{"x0", 0.75}, {"x1", 0.125}},
-      [](const P& s) { return -std::log(.75L - .625L * s[0]); });
-  add("cube_constant", "exponential_cube", {{"x0", 0.5}, {"x1", 0.5}}, [](const P&) { return std::log(2.L); });
-  const auto wave = [](long double s) { return 1 + std::cos(20 * s + static_cast<long double>(.8)); };
-  add("cosine", "cosine", {}, [wave](const P& s) { return wave(s[0]); });
-  add("cosine_box", "cosine", in_box({{"axis", "z"}}), [wave](const P& s) { return wave(s[2]); });
-  add("cosine_slow", "cosine", {{"frequency", 0.5}, {"phase", 3.}}, [](const P& s) { return 1 + std::cos(.5L * s[0] + 3); });
-  add("bump", "gaussian_bump", {}, [](const P& s) { return normal(s[0]); });
-  add("bump_box", "gaussian_bump", in_box({{"axis", "y"}, {"amplitude", 40.}}), [](const P& s) { return 40 * normal(s[1]); });
-  add("bump_wide", "gaussian_bump", {{"sigma", 2.5}}, [](const P& s) { return normal(s[0], 2.5L); });
-  add("hole", "gaussian_hole", {}, [](const P& s) { return 1 - static_cast<long double>(.95) * normal(s[0]); });
-  add("hole_to_zero", "gaussian_hole", in_box({{"depth", 1.}, {"axis", "z"}}), [](const P& s) { return 1 - normal(s[2]); });
-  add("layers", "layers", {}, [](const P& s) {
-    return s[0] < .25L ? .5L : s[0] < .5L ? 2.L : s[0] < .75L ? 0.L : 1.L;
-  }).jumps = true;
-  add("layers_uneven", "layers", in_box({{"values", Numbers{1, 5, 0}}, {"edges", Numbers{0.125, 0.875}}, {"axis", "z"}}),
-      [](const P& s) { return s[2] < .125L   ? 1.L
-                              : s[2] < .875L ? 5.L
-                                             : 0.L; })
-      .jumps = true;
-  add("one_layer", "layers", {{"values", Numbers{1.25}}}, [](const P&) { return 1.25L; });
-  for (const Settings& s : {Settings{}, in_box({{"cells_x", 3}, {"cells_y", 1}, {"cells_z", 7}})}) {
-    const long double n[] = {s.empty() ? 8.L : 3.L, s.empty() ? 8.L : 1.L, s.empty() ? 8.L : 7.L};
-    Case& c = add(s.empty() ? "checkerboard" : "checkerboard_uneven", "checkerboard", s, [=](const P& u) {
-      return std::fmod(std::floor(u[0] * n[0]) + std::floor(u[1] * n[1]) + std::floor(u[2] * n[2]), 2.L) == 0 ? 2.L : 0.L;
-    });
-    c.jumps = true;
-    c.closed = false;
-    c.average_error = 2e-2;  // its oracle is sampled
-  }
-  for (const Settings& s :
-       {Settings{}, in_box({{"frequency", 3}, {"octaves", 2}, {"sharpness", 1}, {"gain", 0.7}, {"seed", 7}})}) {
-    Case& c = add(s.empty() ? "noise" : "noise_box", "fractal_noise", s, nullptr);
-    c.exact = c.closed = false;
-    c.average_error = 5e-2;
-  }
-  Case& one = add("noise_one_octave", "fractal_noise", {{"frequency", 5}, {"octaves", 1}, {"sharpness", 3}}, nullptr);
-  one.closed = false;
-  one.average_error = 5e-2;
-  return all;
-}
+using namespace media_test;
 
 class MediaTest : public testing::TestWithParam<Case> {
  protected:
@@ -452,159 +316,6 @@ TEST_P(MediaTest, PolynomialDegreeIntegratesExactly) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, MediaTest, testing::ValuesIn(cases()), [](const auto& instance) { return instance.param.name; });
-
-std::string error_of(const std::string& type, const Settings& settings) {
-  try {
-    make(type, settings);
-  } catch (const ParameterError& error) {
-    return error.parameter + ": " + error.what();
-  }
-  return "";
-}
-
-TEST(MediaRegistry, HoldsTheProceduralMedia) {
-  for (const char* name : {"checkerboard", "cosine", "exponential", "exponential_cube", "fractal_noise", "gaussian_bump",
-                           "gaussian_hole", "homogeneous", "layers", "linear", "polynomial"}) {
-    const MediumEntry* entry = Registry<MediumEntry>::instance().find(name);
-    ASSERT_NE(entry, nullptr) << name;
-    EXPECT_FALSE(entry->summary.empty());
-    EXPECT_FALSE(entry->source.empty());
-    EXPECT_EQ(make(name)->channels(), 1);
-  }
-}
-
-TEST(MediaParameters, AxisHasTheAskedOpticalDepth) {
-  for (const char* type :
-       {"linear", "polynomial", "exponential", "exponential_cube", "cosine", "gaussian_bump", "gaussian_hole", "layers"})
-    for (const char* axis : {"x", "y", "z"})
-      for (const Real tau : {1e-4, 1., 1000.}) {
-        const auto medium = make(type, {{"axis", axis}, {"optical_depth", tau}, {"lo", kLo}, {"hi", kHi}});
-        Ray r;
-        r.origin = (kLo + kHi) / 2;
-        r.direction = Vec3::Unit(axis[0] - 'x');
-        r.begin = -100;
-        r.end = 100;
-        EXPECT_NEAR((*medium->optical_depth(r))[0], tau, 1e-14 * tau) << type << axis;
-      }
-}
-
-TEST(MediaParameters, ContradictionsAreNamed) {
-  using Numbers = std::vector<Real>;
-  const std::string dip = error_of("polynomial", {{"coefficients", Numbers{0.2, -1, 1}}});
-  EXPECT_NE(dip.find("coefficients: "), std::string::npos);
-  EXPECT_NE(dip.find("-0.05 at s = 0.5"), std::string::npos) << dip;
-  const std::string cubic = error_of("polynomial", {{"coefficients", Numbers{0, 1, -3, 2}}});  // s (1-s) (1-2s)
-  EXPECT_NE(cubic.find("at s = 0.788675"), std::string::npos) << cubic;
-  EXPECT_EQ(error_of("polynomial", {{"coefficients", Numbers{0.25, -1, 1}}}), "");
-  EXPECT_NE(error_of("gaussian_hole", {{"depth", 1.5}}).find("depth: "), std::string::npos);
-  EXPECT_NE(error_of("exponential_cube", {{"x0", 1.}}).find("x0: "), std::string::npos);
-  EXPECT_NE(error_of("exponential_cube", {{"x1", 0.}}).find("x1: "), std::string::npos);
-  EXPECT_NE(error_of("layers", {{"edges", Numbers{0.5}}}).find("edges: "), std::string::npos);
-  EXPECT_NE(error_of("layers", {{"edges", Numbers{0.5, 0.5, 0.75}}}).find("edges: "), std::string::npos);
-  EXPECT_NE(error_of("layers", {{"edges", Numbers{0., 0.5, 0.75}}}).find("edges: "), std::string::npos);
-  EXPECT_NE(error_of("fractal_noise", {{"frequency", 64}, {"octaves", 9}}).find("octaves: "), std::string::npos);
-  for (const MediumEntry& entry : Registry<MediumEntry>::instance().entries()) {
-    if (entry.name == "vdb" || entry.name == "canonical") continue;  // their boxes are the file's, and of a length
-    EXPECT_NE(error_of(entry.name, {{"hi", Vec3(1, 0, 1)}}).find("hi: "), std::string::npos) << entry.name;
-  }
-}
-
-TEST(ExponentialCube, PerpendicularRaysHaveThePowerLaw) {
-  const auto medium = make("exponential_cube");
-  for (const Real x : {1e-12, 0.1, 0.5, 0.999}) {
-    const auto depth = medium->optical_depth({{x, 0.3, 0}, {0, 0, 1}, 0, 0.75});
-    EXPECT_NEAR(std::exp(-(*depth)[0]), std::pow(x, 0.75), 1e-15);
-  }
-  EXPECT_EQ(medium->extrema({{0, 0, 0}, {0.5, 1, 1}}).maximum[0], kInfinity);
-  EXPECT_TRUE(std::isfinite(medium->extrema({{1e-9, 0, 0}, {0.5, 1, 1}}).maximum[0]));
-  EXPECT_NEAR(medium->extrema({{0, 0, 0}, {1, 1, 1}}).average[0], 1, 1e-15);
-}
-
-TEST(Cosine, BoundsHaveTheInnerExtrema) {
-  const auto medium = make("cosine");
-  const Real crest = (2 * std::numbers::pi - 0.8) / 20, trough = (std::numbers::pi - 0.8) / 20;
-  EXPECT_EQ(medium->extrema({{crest - 1e-3, 0, 0}, {crest + 2e-3, 1, 1}}).maximum[0], 2);
-  EXPECT_EQ(medium->extrema({{trough - 1e-3, 0, 0}, {trough + 2e-3, 1, 1}}).minimum[0], 0);
-}
-
-// Far in the tail the difference of error functions keeps its digits: the first terms of the asymptotic series say what it is.
-TEST(GaussianBump, TailKeepsRelativeAccuracy) {
-  const auto medium = make("gaussian_bump", {{"sigma", 0.02}});
-  const Real found = (*medium->optical_depth({{0.8, 0.5, 0.5}, {1, 0, 0}, 0, 0.2}))[0];
-  const long double z = (static_cast<long double>(0.8) - static_cast<long double>(0.32)) / static_cast<long double>(0.02),
-                    q = 1 / (z * z);
-  long double term = 1, series = 0;
-  for (int k = 0; k < 20; ++k, term *= -(2 * k - 1) * q) series += term;
-  const auto expected = static_cast<Real>(static_cast<long double>(0.02) * std::exp(-z * z / 2) / z * series);
-  EXPECT_NEAR(found / expected, 1, 1e-12);
-}
-
-// A majorant grid aligned with the cells has tight bounds in every one of them.
-TEST(StepMedia, AlignedBoxesHaveTightBounds) {
-  for (const int n : {3, 7, 10, 12}) {
-    std::vector<Real> values;
-    for (int i = 0; i < n; ++i) values.push_back(1 + i % 3);
-    const Settings where = {{"lo", kLo}, {"hi", kHi}};
-    Settings layers = where, board = where;
-    layers["values"] = values;
-    board["cells_x"] = board["cells_y"] = board["cells_z"] = n;
-    for (const auto& medium : {make("layers", layers), make("checkerboard", board)})
-      for (int i = 0; i < n; ++i) {
-        const Vec3 step = (kHi - kLo) / n;
-        const Vec3 lo = kLo + i * step, hi = kLo + (i + 1) * step;
-        const Extrema e = medium->extrema({lo, hi});
-        EXPECT_EQ(e.minimum[0], e.maximum[0]) << n << ", " << i;
-      }
-  }
-}
-
-TEST(StepMedia, EdgesBelongToTheCellAbove) {
-  const Vec3 p(0.25, 0.1, 0.1);
-  Real value = -1;
-  make("layers")->extinction({&p[0], &p[1], &p[2], 1}, &value);
-  EXPECT_EQ(value, 2);
-  make("checkerboard")->extinction({&p[0], &p[1], &p[2], 1}, &value);
-  EXPECT_EQ(value, 2);
-  const Vec3 top = Vec3::Ones();
-  make("checkerboard", {{"cells_x", 3}, {"cells_y", 3}, {"cells_z", 3}})->extinction({&top[0], &top[1], &top[2], 1}, &value);
-  EXPECT_EQ(value, 2);
-}
-
-TEST(FractalNoise, EqualsThePlainSumOfOctaves) {
-  const auto medium = make("fractal_noise", {{"seed", 5}, {"octaves", 3}, {"gain", 0.25}});
-  std::mt19937_64 random(3);
-  std::uniform_real_distribution<Real> uniform(0, 1);
-  for (int i = 0; i < 500; ++i) {
-    const Vec3 p(uniform(random), uniform(random), uniform(random));
-    Real n = 0;
-    for (int o = 0; o < 3; ++o) {
-      const Vec3 q = p * (4 << o), cell = q.array().floor(), t = q - cell;
-      const Vec3 w = t.array().square() * (3 - 2 * t.array());
-      Real noise = 0;
-      for (int corner = 0; corner < 8; ++corner) {
-        const Vec3 c(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-        const auto index = [&](int axis) { return static_cast<std::uint32_t>(cell[axis] + c[axis]); };
-        const Real value = philox4x32({index(0), index(1), index(2), static_cast<std::uint32_t>(o)}, {5, 0})[0] * 0x1p-32;
-        noise += value * (c.array() * w.array() + (1 - c.array()) * (1 - w.array())).prod();
-      }
-      n += noise * std::pow(0.25, o) / 1.3125;
-    }
-    Real found = 0;
-    medium->extinction({&p[0], &p[1], &p[2], 1}, &found);
-    ASSERT_NEAR(found, 10 * n * n, 1e-5);  // lattice values keep 24 bits
-  }
-}
-
-TEST(FractalNoise, SeedsDiffer) {
-  std::set<Real> values;
-  const Vec3 p(0.3, 0.4, 0.5);
-  for (int seed = 0; seed < 20; ++seed) {
-    Real value = 0;
-    make("fractal_noise", {{"seed", seed}})->extinction({&p[0], &p[1], &p[2], 1}, &value);
-    values.insert(value);
-  }
-  EXPECT_EQ(values.size(), 20u);
-}
 
 }  // namespace
 }  // namespace nullmark

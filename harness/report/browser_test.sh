@@ -11,6 +11,6 @@ for name in browser_test untimed many_cells; do
   [ $name != untimed ] || config=browser_test options=(--no-timing --filter '^depth')
   "$program" run "$here/$config.json" "${options[@]}" -o "$folder/$name.json" --force >/dev/null 2>"$folder/$name.log" || { tail -1 "$folder/$name.log" >&2; exit 1; }
   "$program" report "$folder/$name.json" -o "$folder/$name.html"
-  /usr/bin/python3 "$here/browser_test.py" "$folder/$name.html" "$folder/$name.json" || code=$?
+  /usr/bin/python3 -B "$here/browser_test.py" "$folder/$name.html" "$folder/$name.json" || code=$?
   [ "$code" -eq 0 ] || exit "$code"
 done

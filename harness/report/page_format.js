@@ -12,6 +12,11 @@ function isNumber(x) {
   return typeof x === "number" && Number.isFinite(x);
 }
 
+/** The interval of a number that is known exactly. */
+function exactly(x) {
+  return isNumber(x) ? { value: x, low: x, high: x } : null;
+}
+
 function formatNumber(x, digits = 4) {
   if (!isNumber(x)) return unknown;
   if (x === 0) return "0";

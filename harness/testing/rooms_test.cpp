@@ -39,7 +39,7 @@ std::string room_of(const std::string& path, const std::map<std::string, std::se
 }
 
 bool is_product(const std::string& path) {
-  static const std::regex kOthers("_(test|bench)\\.cpp$|/(testing|planted|plugin_example)/|^harness/main\\.cpp$");
+  static const std::regex kOthers("_(test|bench)\\.(h|cpp)$|/(testing|planted|plugin_example)/|^harness/main\\.cpp$");
   return std::regex_search(path, std::regex("\\.(h|cpp)$")) && !std::regex_search(path, kOthers);
 }
 

@@ -1,0 +1,124 @@
+"""Numbers and words of the page are those of the results."""
+
+import re
+
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import Select
+
+from .page import PageTest
+from .results import CELLS, TABLES, VERSIONS, numbers_of, same, shown_number, timed
+from .views import once, once_a_layout
+
+
+class ContentsTest(PageTest):
+    @once
+    def test_20_every_number_is_that_of_the_results(self):
+        rows = self.shown_rows()
+        self.assertEqual(len(rows), len(CELLS))
+        compared = 0
+        for index, cell in enumerate(CELLS):
+            if cell["status"] != "ok":
+                continue
+            for key, expected in numbers_of(cell).items():
+                shown = [shown_number(text) for text in rows[index].get(key, [])]
+                self.assertTrue(same(shown, expected), f"{cell['name']}: {key} {shown}, expected {expected}")
+                compared += len(shown)
+        self.detail = f"{compared} numbers of {len(CELLS)} cells"
+
+    @once
+    def test_21_tables_show_the_numbers_of_the_results(self):
+        self.assertEqual(len(self.browser.find_elements(By.CSS_SELECTOR, "#tables table.comparison")), len(TABLES))
+        compared = 0
+        for index, (table, cells) in enumerate(TABLES):
+            heads = self.js(f"""return [...document.querySelectorAll("[data-table='{index}'] thead th.numeric")].map((th) => th.textContent)""")
+            for at, row in enumerate(table["rows"]):
+                shown = self.js(f"""return [...document.querySelectorAll("[data-table='{index}'] [data-row='{at}'] [data-key=table]")].map((one) => one.dataset.value)""")
+                by_heading = dict(zip(heads, map(shown_number, shown)))
+                for heading, number in self.expected_of_row(table, row, cells).items():
+                    self.assertEqual(by_heading.get(heading), number, f"{table['title']}: {row['label']}, {heading}")
+                    compared += 1
+        self.detail = f"{compared} numbers of {len(TABLES)} tables"
+
+    @staticmethod
+    def expected_of_row(table, row, cells):
+        metric = {"lookups": "lookups_per_sample"}.get(table["metric"], table["metric"])
+        expected = dict(row.get("given", {}))
+        if "relative_to" in row:
+            return expected
+        asked = [(heading, one, metric) for heading, one in row.get("cells", {}).items()]
+        if "theory" in row:
+            asked.append(("theory", row["theory"], metric + "_theory"))
+        for heading, one, key in asked:
+            number = cells.get(one.get("cell"), {}).get(key)
+            if isinstance(number, (int, float)):
+                expected[heading] = number
+        return expected
+
+    @once
+    def test_22_tables_show_the_pictures_of_their_cells(self):
+        if not self.js("return Object.values(JSON.parse(document.getElementById('data').textContent).images).length"):
+            self.skipTest("the results have no pictures")
+        if not TABLES:
+            self.skipTest("the results have no tables")
+        shades = self.js("""return [...document.querySelectorAll("#tables canvas")].map((canvas) =>
+            new Set(new Uint32Array(canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size)""")
+        self.assertGreater(len(shades), 0)
+        self.assertGreater(max(shades), 16)
+        self.assertGreater(min(shades), 0)
+
+    @once
+    def test_23_says_which_versions_measured_and_show(self):
+        about = self.find("#summary .about").text
+        for version in VERSIONS:
+            self.assertIn(f"Measured by {version}; page by ", about)
+        lines = self.js("report.runs[0].remarks.push('a remark'); return remarkLines().map((line) => line.textContent)")
+        self.js("report.runs[0].remarks.pop()")
+        self.assertIn("a remark", lines[-2 if not timed() else -1])
+
+    @once
+    def test_24_columns_of_time_are_there_where_something_was_timed(self):
+        heads = self.js("return [...document.querySelectorAll('#ranking th, #verdicts th')].map((th) => th.textContent)")
+        self.assertEqual(any("seconds" in head or head == "ns a sample" for head in heads), timed())
+        said = self.js("return [...document.querySelectorAll('#summary .remark')].some((one) => one.textContent.startsWith('Nothing was timed'))")
+        self.assertEqual(said, not timed())
+
+    @once_a_layout
+    def test_25_badges_explain_and_lead_to_their_cells(self):
+        badges = self.browser.find_elements(By.CSS_SELECTOR, "#summary .totals .badge")
+        choice = Select(self.find("#verdicts select"))
+        outcomes = [option.get_attribute("value") for option in choice.options]
+        for badge in badges:
+            self.assertGreater(len(badge.get_attribute("title")), 20)
+            word = re.sub(r"^\W*\d+ ", "", badge.text)
+            self.js("arguments[0].click()", badge)
+            self.assertEqual(choice.first_selected_option.get_attribute("value"), word if word in outcomes else "")
+        choice.select_by_value("")
+        titles = self.js("return [...document.querySelectorAll('#verdicts .badge.violated')].map((one) => one.title)")
+        for title in titles:
+            self.assertRegex(title, r"lookups above the bound, the largest")
+
+    @once
+    def test_26_names_begin_with_their_experiments(self):
+        several = len({cell["experiment"] for cell in CELLS}) > 1
+        names = self.js("return report.scenes.map((scene) => [scene.short, scene.experiment])")
+        self.assertTrue(all(short.startswith(experiment + ": ") == several for short, experiment in names))
+
+    @once
+    def test_27_numbers_are_written_one_way(self):
+        self.assertEqual(self.js("return [withPageNumbers('T = .95: bias -.133, e.g. 1.5, a-3'), formatPercent(.22)]"),
+                         ["T = 0.95: bias −0.133, e.g. 1.5, a-3", "22\u00a0%"])
+        text = self.js("return document.getElementById('content').textContent")
+        self.assertNotRegex(text, r"to \.?\d+ %")
+
+    @once
+    def test_28_claims_show_their_verdicts(self):
+        claims = self.js("return JSON.parse(document.getElementById('data').textContent).claims")
+        if not claims:
+            self.skipTest("the results have no claims")
+        rows = self.browser.find_elements(By.CSS_SELECTOR, "#claims tbody tr")
+        self.assertEqual(len(rows), len(claims))
+        for row, claim in zip(rows, claims):
+            text = row.text
+            for expected in [claim["id"], claim["finding"], claim["claim"], claim["source"]] + [part["figures"] for part in claim["parts"]]:
+                self.assertIn(expected, text)
+        self.detail = f"{len(claims)} claims"

@@ -1,0 +1,43 @@
+// The words of verdicts: their badges, what they mean, how often each occurs.
+
+const outcomeMarks = { PASS: "✓", FAIL: "✗", VIOLATED: "!", INCONCLUSIVE: "?", "INCONCLUSIVE (as planned)": "?" };
+
+function outcomeBadge(text, word = text, more = {}) {
+  const kind = word.split(" ")[0].toLowerCase();
+  return element(more.href ? "a" : "span", { className: `badge ${kind}`, ...more }, `${outcomeMarks[word] ?? "·"} ${text}`);
+}
+
+const outcomeMeanings = {
+  PASS: "a bias above epsilon is ruled out",
+  FAIL: "bias is proven, or lookups or walks break a law",
+  INCONCLUSIVE: "neither bias nor its absence is proven, though the plan foresaw a decision",
+  "INCONCLUSIVE (as planned)": "the plan said beforehand that no affordable number of samples decides",
+  "nothing claimed": "the estimator claims nothing here, nothing was tested, or the configuration disables the verdict",
+};
+
+function violationsText() {
+  const cells = report.cells.filter((cell) => outcomeOf(cell) === "VIOLATED");
+  const lookups = cells.reduce((sum, cell) => sum + cell.violations, 0);
+  const largest = Math.max(...cells.map((cell) => cell.largest_violation ?? 1));
+  return `needs a majorant that bounds the extinction: ${countOf(lookups, "lookup")} above the bound, largest ratio ${formatNumber(largest, 3)}`;
+}
+
+function outcomeMeaning(word) {
+  return word === "VIOLATED" ? violationsText() : outcomeMeanings[word] ?? "see the reasons in the table of every cell";
+}
+
+const verdictWords = ["PASS", "FAIL", "VIOLATED", "INCONCLUSIVE", "INCONCLUSIVE (as planned)", "ERROR", "not run", "nothing claimed"];
+
+/** How many cells of a word have each mark: "(3 by pilot, 1 own mean)". */
+function marksText(cells) {
+  const counts = new Map();
+  for (const mark of cells.flatMap((cell) => cell.marks)) counts.set(mark, (counts.get(mark) ?? 0) + 1);
+  return counts.size === 0 ? "" : element("small", {}, `(${[...counts].map(([mark, count]) => `${count} ${mark}`).join(", ")}) `);
+}
+
+function verdictTotals() {
+  const cells = verdictWords.map((word) => [word, report.cells.filter((cell) => outcomeOf(cell) === word)]);
+  const badges = cells.filter(([, of]) => of.length > 0).flatMap(([word, of]) =>
+    [outcomeBadge(`${of.length} ${word}`, word, { href: "#verdicts", title: outcomeMeaning(word), onclick: () => chooseOutcome(word) }), marksText(of)]);
+  return element("p", { className: "totals" }, ...badges);
+}

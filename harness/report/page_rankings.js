@@ -1,0 +1,82 @@
+// Rankings: who reaches an error soonest, and the same on common random streams.
+
+function rankText(entry) {
+  if (entry.rank === null) return unknown;
+  return entry.tied ? `${entry.rank}=` : String(entry.rank);
+}
+
+function reachedText(cell, place) {
+  const target = secondsTo(cell, place);
+  if (!target || !cell.time?.ns_per_sample) return unknown;
+  if (!target.reached) return "never";
+  const text = intervalText(target, formatSeconds);
+  return target.amortised ? element("span", {}, "~", text) : text;
+}
+
+function breakEvenText(scene, place) {
+  const entry = scene.break_even.find(({ cell }) => cell === place);
+  if (!entry) return "";
+  if (entry.kind !== "at") return entry.kind;
+  return `cheaper above an error of ${formatPercent(entry.error?.value)} (${formatSeconds(entry.seconds?.value)})`;
+}
+
+function estimatorCell(scene, entry, cell) {
+  const baseline = entry.cell === scene.baseline ? element("span", { className: "tag" }, "baseline") : "";
+  return element("span", {}, markedLabel(entry.label), baseline, claimTag(cell) ?? "");
+}
+
+/** Columns of a ranking; those of times are left out where nothing was timed. */
+const rankingColumns = [
+  { title: "rank", timed: true, of: (_, entry) => rankText(entry) },
+  { title: "estimator", of: estimatorCell },
+  { title: "cost relative to baseline", timed: true, of: (_, entry) => intervalText(entry.relative) },
+  { title: "seconds to\u00a01\u00a0%", timed: true, of: (_, __, cell) => reachedText(cell, 0) },
+  { title: "seconds to\u00a00.1\u00a0%", timed: true, of: (_, __, cell) => reachedText(cell, 1) },
+  { title: "variance", of: (_, __, cell) => intervalText(cell.cost?.variance) },
+  { title: "variance × ns", timed: true, of: (_, __, cell) => intervalText(cell.cost?.variance_x_ns) },
+  { title: "variance × lookups", of: (_, __, cell) => intervalText(cell.cost?.variance_x_lookups) },
+  { title: "floor of the error", of: (_, __, cell) => (floorText(cell) ? intervalText(cell.cost.floor, formatPercent) : "") },
+  { title: "against the best unbiased", timed: true, of: (scene, entry) => breakEvenText(scene, entry.cell) },
+].filter(({ timed }) => anythingTimed || !timed);
+
+function rankingRow(scene, entry) {
+  const row = tableRow(rankingColumns.map(({ of }) => of(scene, entry, report.cells[entry.cell])));
+  row.dataset.ranked = String(entry.cell);
+  return row;
+}
+
+function amortisedNote(entries) {
+  const some = entries.some((entry) => report.cells[entry.cell].cost?.seconds.some(({ amortised }) => amortised));
+  return some ? element("p", { className: "says" }, "~ fewer samples are needed than shared a walk through the majorant structure when they were timed.") : "";
+}
+
+function unpairedText(scene) {
+  const reasons = report.unpaired.filter((one) => one.scene === scene.index && passes(report.cells[one.cell]));
+  return reasons.length === 0 ? "" : `Not paired: ${reasons.map((one) => `${report.cells[one.cell].label} ${one.reason}`).join("; ")}.`;
+}
+
+/** The error of one sample does not tell of a floor; that of the run's means does, and stands beside it. */
+function pairedTable(scene) {
+  const pairs = report.paired.filter((pair) => pair.scene === scene.index && passes(report.cells[pair.cell]) && passes(report.cells[pair.against]));
+  const missing = unpairedText(scene);
+  if (pairs.length === 0 && missing === "") return null;
+  const floors = pairs.some((pair) => pair.of_the_means);
+  const headings = ["estimator", "against", "ratio for 1 sample, same streams", "interval if streams were independent",
+    ...(floors ? [`ratio for ${pairs[0].samples} samples, bias included`] : [])];
+  const rows = pairs.map((pair) => [
+    markedLabel(report.cells[pair.cell].label), markedLabel(report.cells[pair.against].label), formatInterval(pair.ratio),
+    formatEnds(pair.unpaired, (x) => formatNumber(x, 3)), ...(floors ? [pair.of_the_means ? formatInterval(pair.of_the_means) : ""] : [])]);
+  return details("Mean squared errors on common random streams", pairs.length > 0 ? plainTable(headings, rows) : "", element("p", { className: "says" }, missing));
+}
+
+function showRanking(panel, scene) {
+  const entries = scene.ranking.filter((entry) => passes(report.cells[entry.cell]));
+  const table = element("table", { className: "ranking" }, headRow(rankingColumns.map(({ title }) => title)), element("tbody", {}, ...entries.map((entry) => rankingRow(scene, entry))));
+  panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), amortisedNote(entries), pairedTable(scene) ?? ""));
+}
+
+function buildRanking(body) {
+  const update = scenePanels(body, (cell) => cell.cost !== null, showRanking);
+  body.querySelector(".panels").classList.add("stacked");
+  return update;
+}

@@ -1,0 +1,65 @@
+// Summary: what the runs are, how their verdicts end, who is fastest where.
+
+function winnersOf(scene) {
+  return scene.ranking.filter((entry) => entry.rank === 1 && passes(report.cells[entry.cell]));
+}
+
+/** The fastest of those that claim to be unbiased, with whom it is tied. */
+function unbiasedWinnersOf(scene) {
+  const entries = scene.ranking.filter((entry) => entry.rank !== null && passes(report.cells[entry.cell]) && claimsUnbiased(report.cells[entry.cell]));
+  const best = Math.min(...entries.map(({ rank }) => rank));
+  return entries.filter(({ rank }) => rank === best);
+}
+
+function claimTag(cell) {
+  return cell.claims === "unbiased" || cell.claims === "exact" ? null : element("span", { className: "tag" }, cell.claims);
+}
+
+function namesAndSeconds(entries) {
+  const names = entries.flatMap((entry, i) => [i > 0 ? " = " : "", markedLabel(entry.label), claimTag(report.cells[entry.cell]) ?? ""]);
+  const seconds = entries.map((entry) => formatSeconds(secondsTo(report.cells[entry.cell], 0)?.value));
+  return [element("span", {}, ...names), seconds.join(" = ")];
+}
+
+function winnerRow(scene) {
+  return [scene.short, ...namesAndSeconds(winnersOf(scene)), ...namesAndSeconds(unbiasedWinnersOf(scene))];
+}
+
+function tally(scenes, winners) {
+  const wins = new Map();
+  for (const scene of scenes) for (const { label } of winners(scene)) wins.set(label, (wins.get(label) ?? 0) + 1);
+  return listed([...wins].sort((a, b) => b[1] - a[1]).map(([label, count]) => `${label} in ${countOf(count, "scene")}`), 2);
+}
+
+function winnersSentence(scenes) {
+  const unbiased = tally(scenes, unbiasedWinnersOf);
+  const best = unbiased ? `; best unbiased: ${unbiased}` : "";
+  return `Fastest to 1\u00a0% error, alone or tied, of ${countOf(scenes.length, "scene")}: ${tally(scenes, winnersOf)}${best}`;
+}
+
+function versionsText() {
+  const measured = [...new Set(report.runs.map(({ version }) => version))];
+  return `Measured by ${listed(measured)}; page by ${report.version}`;
+}
+
+/** What a reader must know of the results before trusting or missing something. */
+function remarkLines() {
+  const lines = report.runs.flatMap((run) => run.remarks.map((remark) => `${run.file}: ${remark}`));
+  if (!anythingTimed) lines.push("Nothing was timed (--no-timing, or the configuration disables it), so columns and plots of time are left out.");
+  return lines.map((line) => element("p", { className: "remark" }, line));
+}
+
+function buildSummary(body) {
+  const winners = details("");
+  const runs = report.runs.map((run) => run.file).join(", ");
+  body.append(
+    element("p", { className: "about" }, `${countOf(report.cells.length, "cell")} of ${runs}. ${versionsText()}`), ...remarkLines(), verdictTotals(), winners);
+  if (report.tables.length === 0 && report.scenes.length <= 12) winners.open = true;
+  if (report.credits.length > 0) winners.after(details("Volumes shown and their makers", element("ul", {}, ...report.credits.map((line) => element("li", {}, line)))));
+  return () => {
+    const scenes = report.scenes.filter((scene) => winnersOf(scene).length > 0);
+    winners.hidden = scenes.length === 0;
+    winners.replaceChildren(
+      element("summary", {}, winnersSentence(scenes)), plainTable(["scene", "fastest to 1\u00a0% (= tied)", "seconds a ray", "fastest unbiased", "seconds a ray"], scenes.map(winnerRow)));
+  };
+}
