@@ -11,6 +11,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <tuple>
 
 #include "harness/config/cell_names.h"
 #include "harness/io/json_input.h"
@@ -71,8 +72,9 @@ void tell_apart(std::vector<RankedCell>& cells, const std::vector<RunRecord>& ru
 /// Reachable in a known time.
 bool has_time(const RankedCell& ranked) { return ranked.seconds[0] && std::isfinite(ranked.seconds[0]->value); }
 
-bool claims_unbiased(const RankedCell& ranked) {
-  return ranked.record->claims == "unbiased" && ranked.record->cell.measurement == Measurement{};
+/// Exact trackers are no rivals: they draw nothing.
+bool is_unbiased_estimator(const RankedCell& ranked) {
+  return ranked.record->claims == "unbiased" && stands_unbiased(*ranked.record);
 }
 
 void rank(std::vector<RankedCell>& cells) {
@@ -109,7 +111,7 @@ std::optional<std::size_t> best_unbiased(const std::vector<RankedCell>& cells) {
   const auto price = [&](std::size_t i) { return cells[i].cost->variance_x_ns->value; };
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const RankedCell& ranked = cells[i];
-    if (!claims_unbiased(ranked) || !ranked.cost || !ranked.cost->variance_x_ns || !(price(i) > 0)) continue;
+    if (!is_unbiased_estimator(ranked) || !ranked.cost || !ranked.cost->variance_x_ns || !(price(i) > 0)) continue;
     if (!best || price(i) < price(*best)) best = i;
   }
   return best;
@@ -187,14 +189,40 @@ void pair_up(Comparison& comparison, std::size_t one, std::size_t other) {
                                  ratio_of_means(first.cost, second.cost, a.cell.samples_per_ray)});
 }
 
+/// What the walks gave, where they drew random numbers at all.
+auto drawn(const CellRecord& record) {
+  std::vector<std::optional<Real>> figures;
+  for (const ChannelRecord& channel : record.channel)
+    figures.insert(figures.end(), {channel.mean, channel.variance, channel.rmse});
+  return std::tuple(record.samples, record.draws, record.lookups, record.squared_error_blocks, figures);
+}
+
+void remark(Comparison& comparison) {
+  const std::vector<RankedCell>& cells = comparison.cells;
+  std::map<decltype(drawn(*cells[0].record)), std::vector<std::size_t>> alike;
+  Remark lanes{Remark::Kind::lanes, {}};
+  bool one_walk = false;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const CellRecord& record = *cells[i].record;
+    if (record.draws > 0 && record.samples > 1) alike[drawn(record)].push_back(i);
+    if (!record.time) continue;
+    one_walk |= !record.in_lanes;
+    if (record.in_lanes) lanes.cells.push_back(i);
+  }
+  for (auto& [figures, those] : alike)
+    if (those.size() > 1) comparison.remarks.push_back({Remark::Kind::equal, those});
+  if (one_walk && !lanes.cells.empty()) comparison.remarks.push_back(lanes);
+}
+
 void decide(Comparison& comparison, const std::vector<RunRecord>& runs, const std::string& baseline) {
   std::vector<RankedCell>& cells = comparison.cells;
   rank(cells);
   tell_apart(cells, runs);
   mark_pareto(cells);
+  remark(comparison);
   comparison.best_unbiased = best_unbiased(cells);
   const auto base = std::find_if(cells.begin(), cells.end(), [&](const RankedCell& ranked) {
-    return baseline.empty() ? claims_unbiased(ranked) : is_named(ranked, baseline);
+    return baseline.empty() ? is_unbiased_estimator(ranked) : is_named(ranked, baseline);
   });
   if (base != cells.end()) comparison.baseline = static_cast<std::size_t>(base - cells.begin());
   for (std::size_t i = 0; i < cells.size(); ++i) {

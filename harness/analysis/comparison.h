@@ -44,14 +44,23 @@ struct Unpaired {
   std::string reason;
 };
 
+/// What the figures of some cells do not tell.
+struct Remark {
+  /// `equal`: the cells gave the same samples, to the last bit.  `lanes`: the cells ran side by side in registers and were timed;
+  /// others of the comparison were timed too, and ran one walk at a time.
+  enum class Kind { equal, lanes } kind = Kind::equal;
+  std::vector<std::size_t> cells;
+};
+
 /// Cells that differ only in the tracker (including its precision and seed), sorted by time to the first target.
 struct Comparison {
   std::string name, quantity, medium, majorant, rays, light, measurement;
   std::vector<RankedCell> cells;             ///< by rank, then by time; those without a rank last
-  std::optional<std::size_t> baseline;       ///< the first that claims to be unbiased, or the requested one
-  std::optional<std::size_t> best_unbiased;  ///< least variance x time among cells that claim to be unbiased and have variance
+  std::optional<std::size_t> baseline;       ///< the first that stands as unbiased, or the requested one
+  std::optional<std::size_t> best_unbiased;  ///< least variance x time among cells that stand as unbiased and have variance
   std::vector<Pairing> pairings;             ///< of all other cells with the baseline, if they have the same streams
-  std::vector<Unpaired> unpaired;            ///< other cells with different streams or unknown errors
+  std::vector<Remark> remarks;
+  std::vector<Unpaired> unpaired;  ///< other cells with different streams or unknown errors
 };
 
 /// All comparisons of some results, in the order of their first cells.  `baseline` is a tracker's type or label, or empty. Throws

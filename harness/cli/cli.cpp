@@ -80,6 +80,7 @@ class CommandLine {
     app_.require_subcommand(1);
     app_.failure_message(CLI::FailureMessage::simple);
     add_run();
+    add_prove();
     add_replay();
     add_check();
     add_compare();
@@ -160,6 +161,21 @@ class CommandLine {
             },
             "SECONDS"));
     command->add_flag("--no-timing", run_.no_timing, "Skip timing; statistics only");
+  }
+
+  void add_prove() {
+    CLI::App* command = add("prove", "Try one tracker on many scenes, or one medium; exit code 3 if a bias is proven", [this] {
+      if (prove_.estimator.empty() && prove_.medium.empty())
+        throw InputError("prove what? expected an estimator, --medium MEDIUM, or both");
+      prove_.command_line = run_.command_line;
+      return prove_command(prove_);
+    });
+    command->add_option("ESTIMATOR", prove_.estimator, "Name of an estimator, or an object as in a configuration");
+    command->add_option("--medium", prove_.medium,
+                        "Name of a medium, or an object: tests its promises, and the tracker on it alone");
+    command->add_flag("--quick", prove_.quick, "An eighth of the samples and fewer media");
+    command->add_option("--threads", prove_.threads, "Number of threads; 0: all cores")->check(CLI::Range(0, 4096));
+    command->add_option("-o,--output", prove_.output, "Also write the results, for check and replay; replaces an existing file");
   }
 
   void add_replay() {
@@ -309,6 +325,7 @@ class CommandLine {
   CLI::App app_{"Benchmark and validation harness for null-collision trackers", "nullmark"};
   std::function<ExitCode()> action_;
   RunCommand run_;
+  ProveCommand prove_;
   ReplayCommand replay_;
   GateCommand gate_;
   ReportCommand report_;

@@ -23,6 +23,17 @@ struct RunCommand {
 };
 ExitCode run_command(const RunCommand& command);
 
+/// `nullmark prove`.
+struct ProveCommand {
+  std::string estimator;  ///< a name, or an object as in a configuration; empty: ratio, to try a medium with
+  std::string medium;     ///< likewise; empty: those of the battery
+  std::string output;     ///< results file; empty: none
+  int threads = 0;
+  bool quick = false;
+  std::vector<std::string> command_line;
+};
+ExitCode prove_command(const ProveCommand& command);
+
 /// `nullmark replay`.
 struct ReplayCommand {
   std::string results, cell;

@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "harness/cli/commands.h"
+#include "harness/cli/signals.h"
 #include "harness/config/config.h"
 #include "harness/io/file_io.h"
 #include "harness/io/outputs.h"
@@ -34,17 +35,6 @@
 
 namespace nullmark {
 namespace {
-
-std::atomic<int> received_signal{0};
-
-/// Has SIGINT and SIGTERM end the run after the samples under way; a second one ends the program at once.
-void catch_signals() {
-  struct sigaction action = {};
-  action.sa_handler = [](int number) { received_signal = number; };
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  ::sigaction(SIGINT, &action, nullptr);
-  ::sigaction(SIGTERM, &action, nullptr);
-}
 
 template <class Number>
 std::optional<Number> parsed(std::string_view text) {

@@ -145,7 +145,10 @@ const std::vector<Axis>& axes() {
           "transport", transport_schema(), read_transport, [](auto& c) -> auto& { return c.cell.transport; }),
       axis(
           "precision", described({{"enum", precision_names()}}, "precision of walks; default: \"double\""), read_enum<Precision>,
-          [](auto& c) -> auto& { return c.cell.precision; })};
+          [](auto& c) -> auto& { return c.cell.precision; }),
+      axis(
+          "lanes", described({{"type", "boolean"}}, "walks may run side by side in registers; default: true"),
+          [](const JsonNode& node) { return node.boolean(); }, [](auto& c) -> auto& { return c.cell.lanes; })};
   return kAxes;
 }
 

@@ -63,6 +63,7 @@ void name_cells(Plan& plan) {
     cell.id = cell_id(plan, cell);
     cell.name = fmt::format("{}/{}/{}", cell.estimator.label, plan.media[cell.medium].label, plan.majorants[cell.majorant].label);
     if (cell.precision != Precision::float64) cell.name += "/" + to_string(cell.precision);
+    if (!cell.lanes) cell.name += "/one_walk";
   }
   add_experiments_where_needed(plan);
   for (const auto& [name, cells] : cells_by_name(plan)) add_distinctions(plan, cells);

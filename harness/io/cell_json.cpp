@@ -294,6 +294,9 @@ void visit_cell(Visit& visit, CellRecord& record) {
   visit.required("ray_set", ComponentField{record.ray_set, ComponentKind::ray_set});
   visit.required("quantity", cell.quantity);
   visit.lenient("precision", cell.precision);
+  visit.sparse("in_lanes", record.in_lanes, "walks ran side by side in registers");
+  if (Visit::kReads || Visit::kDescribes || !cell.lanes)
+    visit.lenient("lanes", cell.lanes, "false where the configuration forbids it");
   visit.part("measurement", [&](auto& inner) { visit_fields(inner, cell.measurement); });
   visit.lenient("transport", TransportField{cell.transport});
   visit.required("channels", WithinField{record.channels, 1, kMaxChannels});

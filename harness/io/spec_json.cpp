@@ -31,6 +31,7 @@ Json deciding_json(const Plan& plan, const Cell& cell) {
                {"measurement", fields_json(cell.measurement)}};
   if (cell.transport != TransportSpec{}) json["transport"] = transport_json(cell.transport);
   if (cell.precision != Precision::float64) json["precision"] = to_string(cell.precision);
+  if (!cell.lanes) json["lanes"] = false;
   add_samples(json, cell);
   json["seed"] = cell.seed;
   json["own_streams"] = cell.own_streams;

@@ -153,6 +153,7 @@ struct TestsField {
     for (const JsonNode& element : node.elements()) {
       TestRecord test = unproven_test();
       read_fields(element, test);
+      if (test.deterministic()) test.log_e_fail = test.log_e_low = test.log_e_high = test.log_e_beyond = 0;
       const int channel = test.channel;
       tests.push_back(std::move(test));
       if (element.has("groups")) read_groups(element["groups"], channel, tests);

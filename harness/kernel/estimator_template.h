@@ -32,8 +32,8 @@ class EstimatorTemplate final : public EstimatorSource {
   void check(const Extrema& medium) const override {
     if constexpr (Traits::kCheck) grey_.check(medium);
   }
-  std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64) const override {
-    if (channels == 1) {
+  std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64, bool lanes = true) const override {
+    if (channels == 1 && lanes) {
       if constexpr (kInLanes) {
         if (precision == Precision::float32) return std::make_unique<LaneKernel<Estimator, float>>(grey_, single_);
         return std::make_unique<LaneKernel<Estimator, Real>>(grey_, lanes_);

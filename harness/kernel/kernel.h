@@ -134,6 +134,9 @@ class Kernel {
   /// profile only lookups are stated.
   virtual std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const = 0;
 
+  /// Whether the walks of a quantity run side by side in registers.
+  virtual bool in_lanes(Quantity) const { return false; }
+
   /// Whether a sample is one flight through a majorant, so that the laws of collisions apply.
   virtual bool flies() const = 0;
 
@@ -163,8 +166,9 @@ class EstimatorSource {
   virtual std::optional<Real> order(Quantity) const = 0;
   /// Throws ParameterError if the parameters do not fit the medium.
   virtual void check(const Extrema& medium) const = 0;
-  /// Null if there is none in this precision.
-  virtual std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64) const = 0;
+  /// Null if there is none in this precision.  `lanes`: walks may run side by side in registers.
+  virtual std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64,
+                                               bool lanes = true) const = 0;
   virtual Walkers walkers() const { return {}; }
 };
 

@@ -88,6 +88,10 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
 
   bool answers(Quantity quantity) const override { return Base::answers(quantity) && (!kSingle || in_lanes(quantity)); }
 
+  bool in_lanes(Quantity quantity) const override {
+    return quantity == Quantity::transmittance || quantity == Quantity::optical_depth;
+  }
+
   bool flies() const override { return !kSingle && Base::flies(); }
 
   void sample(Workspace& workspace, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
@@ -106,8 +110,6 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
   }
 
  private:
-  static bool in_lanes(Quantity quantity) { return quantity == Quantity::transmittance || quantity == Quantity::optical_depth; }
-
   /// Counts of a block.
   struct Tally {
     std::uint64_t draws = 0, lookups = 0, real = 0, violations = 0;

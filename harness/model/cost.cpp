@@ -36,6 +36,15 @@ std::vector<std::pair<std::uint64_t, Interval>> times_by_batch(const TimeRecord&
 
 }  // namespace
 
+bool stands_unbiased(const CellRecord& record) {
+  // Samples that are clamped or rounded are biased, whatever their tracker is.
+  if (!(record.cell.measurement == Measurement{}) || (record.claims != "unbiased" && record.claims != "exact")) return false;
+  if (!record.verdict) return true;
+  const VerdictRecord& verdict = *record.verdict;
+  return verdict.unbiased != Outcome::fail && verdict.unbiased != Outcome::violated && verdict.lookups != Outcome::fail &&
+         verdict.lawful != Outcome::fail;
+}
+
 std::optional<Cost> cost_of(const CellRecord& record) {
   if (record.status != Status::ok || record.channel.empty() || !record.outputs.empty()) return std::nullopt;
   Real variance = 0, mean_square_error = 0, reference = 0, relative_error = 0;
@@ -65,9 +74,7 @@ std::optional<Cost> cost_of(const CellRecord& record) {
   if (record.time) cost.ns_per_sample = median_interval(record.time->repetition_ns);
   if (cost.ns_per_sample) cost.ns_by_batch = times_by_batch(*record.time, *cost.ns_per_sample);
   if (cost.ns_per_sample) cost.variance_x_ns = product(cost.variance, *cost.ns_per_sample);
-  // Samples that are clamped or rounded are biased whatever their tracker is.
-  const bool claims_unbiased = record.claims == "unbiased" || record.claims == "exact";
-  if ((!claims_unbiased || !(record.cell.measurement == Measurement{})) && errors_known)
+  if (!stands_unbiased(record) && errors_known)
     cost.floor = floor_of(record, mean_square_error / channels, cost.variance.value, cost.reference);
   return cost;
 }

@@ -23,10 +23,13 @@ struct Cost {
   /// Cost of a sample by the number that share a walk through the majorant structure, ascending; the last is ns_per_sample.
   std::vector<std::pair<std::uint64_t, Interval>> ns_by_batch;
   std::optional<Interval> variance_x_lookups, variance_x_ns;
-  /// Relative error that no number of samples removes, of estimators that do not claim to be unbiased, and of samples that are
-  /// clamped or rounded; from the rays' errors.
+  /// Relative error that no number of samples removes, from the rays' errors, of cells that do not stand as unbiased.
   std::optional<Interval> floor;
 };
+
+/// Whether a cell counts as unbiased: its estimator claims it, its samples are used as drawn, and its verdict is neither FAIL nor
+/// VIOLATED.
+bool stands_unbiased(const CellRecord& record);
 
 /// Nothing if a channel's reference or variance is unknown, the reference is 0, or the cell has several outputs per channel.
 std::optional<Cost> cost_of(const CellRecord& record);

@@ -123,6 +123,7 @@ struct Cell {
   std::size_t medium = 0, majorant = 0, rays = 0;
   Quantity quantity = Quantity::transmittance;
   Precision precision = Precision::float64;
+  bool lanes = true;  ///< walks may run side by side in registers, where the tracker can; the statistics are the same
   Measurement measurement;
   TransportSpec transport;
   std::uint64_t samples_per_ray = 1;

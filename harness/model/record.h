@@ -127,6 +127,7 @@ struct CellRecord {
   bool given_depth = false;      ///< the estimator is handed the exact optical depth
   std::optional<Real> reliance;  ///< if given_depth: share of its answer that follows that depth, 1: all; see reliance.h
   std::optional<Real> order;     ///< order in the step of a consistent estimator's bias
+  bool in_lanes = false;         ///< walks ran side by side in registers
   int channels = 1;
   std::vector<std::string> outputs;  ///< for quantities with several numbers per channel: the names of the entries of `channel`
   std::vector<std::string> effects{"absorption"};

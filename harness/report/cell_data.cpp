@@ -143,6 +143,7 @@ Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& image
           {"estimator", tracker_label(cell)},
           {"type", cell.estimator.type},
           {"claims", record.claims},
+          {"unbiased", stands_unbiased(record)},
           {"precision", to_string(cell.precision)},
           {"medium", record.medium.label},
           {"majorant", record.majorant.label},

@@ -1,6 +1,7 @@
 #include "harness/report/comparison_text.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include "harness/analysis/comparison.h"
 #include "harness/io/text.h"
 #include "harness/report/results_tables.h"
+#include "harness/verdict/cell_word.h"
 
 namespace nullmark {
 namespace {
@@ -65,12 +67,13 @@ bool any_floor(const Comparison& comparison) {
 
 std::vector<Line> ranking(const Comparison& comparison) {
   const bool floors = any_floor(comparison);
-  Line heading = {"", "estimator", "variance", "variance x lookups", "variance x ns", "s to 1 %", "s to 0.1 %", "/ baseline"};
+  Line heading = {"",         "estimator",  "verdict",   "variance", "variance x lookups", "variance x ns",
+                  "s to 1 %", "s to 0.1 %", "/ baseline"};
   if (floors) heading.insert(heading.end(), {"floor", "cheaper than the best unbiased until"});
   std::vector<Line> lines = {heading};
   for (const RankedCell& ranked : comparison.cells) {
     const std::optional<Cost>& cost = ranked.cost;
-    lines.push_back({rank_shown(ranked), ranked.label, cost ? shown(cost->variance) : "-",
+    lines.push_back({rank_shown(ranked), ranked.label, standing_of(*ranked.record), cost ? shown(cost->variance) : "-",
                      cost ? shown(cost->variance_x_lookups) : "-", cost ? shown(cost->variance_x_ns) : "-", time_shown(ranked, 0),
                      time_shown(ranked, 1), shown(ranked.relative)});
     if (floors) lines.back().insert(lines.back().end(), {floor_shown(ranked), break_even_shown(ranked)});
@@ -112,6 +115,22 @@ std::string amortised_line(const Comparison& comparison) {
   return "";
 }
 
+std::string remark_lines(const Comparison& comparison) {
+  std::string text;
+  for (const Remark& remark : comparison.remarks) {
+    std::vector<std::string> labels;
+    for (const std::size_t i : remark.cells) labels.push_back(comparison.cells[i].label);
+    const std::string names = fmt::format("{}", fmt::join(labels, ", "));
+    text += remark.kind == Remark::Kind::equal
+                ? fmt::format("the same samples to the last bit: {}\n", names)
+                : fmt::format(
+                      "timed with walks side by side in registers: {}; the others ran one walk at a time; \"lanes\": false in "
+                      "the configuration times all alike\n",
+                      names);
+  }
+  return text;
+}
+
 std::string baseline_line(const Comparison& comparison) {
   return comparison.baseline ? fmt::format("baseline: {}", comparison.cells[*comparison.baseline].label) : "no baseline here";
 }
@@ -122,7 +141,7 @@ std::string compare_text(const std::vector<RunRecord>& runs, const std::string& 
   std::string text;
   for (const Comparison& comparison : comparisons(runs, baseline)) {
     text += fmt::format("{}\n{}", comparison.name, aligned(ranking(comparison), 2));
-    text += amortised_line(comparison);
+    text += amortised_line(comparison) + remark_lines(comparison);
     if (paired && !comparison.pairings.empty()) text += aligned(pairs(comparison), 1);
     if (paired) text += not_paired(comparison);
     text += baseline_line(comparison) + "\n\n";
@@ -136,7 +155,8 @@ std::string compare_markdown(const std::vector<RunRecord>& runs, const std::stri
   std::string text;
   for (const Comparison& comparison : comparisons(runs, baseline)) {
     text += fmt::format("**{}**\n\n{}\n", markdown_cell(comparison.name), markdown_table(ranking(comparison)));
-    if (const std::string line = amortised_line(comparison); !line.empty()) text += line + "\n";
+    for (const std::string& line : {amortised_line(comparison), remark_lines(comparison)})
+      if (!line.empty()) text += markdown_cell(line) + "\n";
     if (paired && !comparison.pairings.empty()) text += markdown_table(pairs(comparison)) + "\n";
     if (paired && !comparison.unpaired.empty()) text += markdown_cell(not_paired(comparison)) + "\n";
     text += baseline_line(comparison) + "\n\n";

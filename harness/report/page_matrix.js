@@ -27,7 +27,7 @@ function matrixOf(view) {
   const keptColumns = columns.map((_, column) => column).filter((column) => keptRows.some((row) => known(grid[row][column])));
   const best = keptColumns.map((column) => {
     const rivals = keptRows.map((row) => grid[row][column]).filter((entry) => known(entry) && entry.cost.value !== 0);
-    const unbiased = rivals.filter(({ cell }) => claimsUnbiased(cell));
+    const unbiased = rivals.filter(({ cell }) => standsUnbiased(cell));
     return Math.min(...(unbiased.length > 0 ? unbiased : rivals).map(({ cost }) => cost.value));
   });
   return {
@@ -149,7 +149,7 @@ function matrixAxis(theme, names, angle, every) {
 }
 
 function matrixCaption({ labels, scenes, entries }) {
-  const best = labels.map((label, row) => [label, entries[row].filter(({ relative, cell }) => relative === 1 && claimsUnbiased(cell)).length]).sort((a, b) => b[1] - a[1]);
+  const best = labels.map((label, row) => [label, entries[row].filter(({ relative, cell }) => relative === 1 && standsUnbiased(cell)).length]).sort((a, b) => b[1] - a[1]);
   const named = best.filter(([, count]) => count > 0).map(([label, count]) => `${label} ${count}`);
   return `${countOf(labels.length, "estimator")} on ${countOf(scenes.length, "scene")}. Best unbiased of its column, and how often: ${listed(named) || "none"}.`;
 }

@@ -66,9 +66,9 @@ function measurementOf(cell) {
   return cell.scene === null ? "" : report.scenes[cell.scene].measurement;
 }
 
-/** Samples that are clamped or rounded are biased whatever their tracker is. */
-function claimsUnbiased(cell) {
-  return ["unbiased", "exact"].includes(cell.claims) && measurementOf(cell) === "";
+/** Claimed, and not disproven by the verdict. */
+function standsUnbiased(cell) {
+  return cell.unbiased;
 }
 
 /** The error that no number of samples removes, as far as noise lets it be seen; empty where there is none. */

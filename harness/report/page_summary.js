@@ -6,7 +6,7 @@ function winnersOf(scene) {
 
 /** The fastest of those that claim to be unbiased, with whom it is tied. */
 function unbiasedWinnersOf(scene) {
-  const entries = scene.ranking.filter((entry) => entry.rank !== null && passes(report.cells[entry.cell]) && claimsUnbiased(report.cells[entry.cell]));
+  const entries = scene.ranking.filter((entry) => entry.rank !== null && passes(report.cells[entry.cell]) && standsUnbiased(report.cells[entry.cell]));
   const best = Math.min(...entries.map(({ rank }) => rank));
   return entries.filter(({ rank }) => rank === best);
 }

@@ -125,6 +125,7 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
     if (cell.quantity == Quantity::radiance) record.effects = prepared.effects;
     if (const auto alone = make_estimator(cell.estimator)->kernel(record.channels, cell.precision))
       record.given_depth = alone->needs_optical_depth();
+    record.in_lanes = prepared.kernel && prepared.kernel->in_lanes(cell.quantity);
     if (!prepared.takes_part) record.reason = "constant extinction: closed-form flights, the estimator takes no part";
   }
   return record;

@@ -28,7 +28,8 @@ std::string duration(double seconds) {
 
 }  // namespace
 
-Progress::Progress(std::size_t total) : total_(total), terminal_(::isatty(STDERR_FILENO) == 1) {
+Progress::Progress(std::size_t total, Lines lines)
+    : total_(total), terminal_(::isatty(STDERR_FILENO) == 1), lines_(lines == Lines::each_cell) {
   const char* no_colour = std::getenv("NO_COLOR");
   colour_ = terminal_ && !(no_colour && *no_colour);
 }
@@ -46,6 +47,7 @@ void Progress::cell_done(const CellRecord& record, std::size_t done, std::size_t
     draw(static_cast<double>(done), record.cell.name);
     return;
   }
+  if (!lines_) return;
   fmt::print(stderr, "[{}/{}] {}: {}{}\n", done, total, record.cell.name, to_string(record.status),
              record.reason.empty() ? "" : " (" + record.reason + ")");
 }

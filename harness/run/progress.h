@@ -8,10 +8,13 @@
 
 namespace nullmark {
 
-/// Shows the progress of a run on stderr: a bar on a terminal (coloured unless NO_COLOR is set), otherwise one line per cell.
+/// Shows the progress of a run on stderr: a bar on a terminal (coloured unless NO_COLOR is set), otherwise one line per cell, or
+/// nothing.
 class Progress {
  public:
-  Progress(std::size_t total);
+  enum class Lines { each_cell, none };
+
+  Progress(std::size_t total, Lines lines = Lines::each_cell);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -28,7 +31,7 @@ class Progress {
   void clear();
 
   std::size_t total_, done_ = 0, timed_ = 0;
-  bool terminal_, colour_, drawn_ = false;
+  bool terminal_, lines_, colour_, drawn_ = false;
   Clock::time_point start_ = Clock::now(), last_drawn_{};
 };
 

@@ -35,8 +35,8 @@ struct CellOutcome {
 };
 
 /// Samples and judges a cell.
-CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& families, bool late, const RunOptions& options,
-                     const RunObserver& observer, const std::function<bool()>& stop) {
+CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& families, const std::function<bool()>& late,
+                     const RunOptions& options, const RunObserver& observer, const std::function<bool()>& given_up) {
   CellOutcome outcome{blank_record(plan, prepared), {}};
   CellRecord& record = outcome.record;
   if (!prepared.reason.empty()) {
@@ -44,8 +44,10 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     record.reason = prepared.reason;
     return outcome;
   }
-  if (stop() || late) {
-    record.reason = stop() ? "interrupted" : "time budget spent";
+  const auto stop = [&] { return given_up() || late(); };
+  const auto why = [&] { return given_up() ? "interrupted" : "time budget spent"; };
+  if (stop()) {
+    record.reason = why();
     return outcome;
   }
   const auto progress = [&](double fraction) { observer.progress(record, fraction); };
@@ -61,7 +63,7 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
   if (sampled && test_plan)
     verdict = judge(prepared, *test_plan, *sampled, kept, plan.error_rates, families, outcome.effort, stop, progress);
   if (!sampled || (test_plan && !verdict)) {
-    record.reason = "interrupted";
+    record.reason = why();
     return outcome;
   }
   fill_statistics(record, prepared, *sampled);
@@ -116,6 +118,9 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
   std::size_t done = 0;
   std::atomic<bool> failed = false;
   const auto given_up = [&] { return stop() || failed || teller.failed(); };
+  const auto late = [&] {
+    return options.time_budget && std::chrono::duration<double>(Clock::now() - start).count() > *options.time_budget;
+  };
   RunObserver guarded = observer;
   guarded.warning = [&](const std::string& message) {
     const std::lock_guard lock(telling);
@@ -126,8 +131,6 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
     if (const std::unique_lock lock(telling, std::try_to_lock); lock) observer.progress(record, fraction);
   };
   for_each_in_order(cells.size(), threads, failed, [&](std::size_t i) {
-    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    const bool late = options.time_budget && seconds > *options.time_budget;
     outcomes[i] = run_cell(plan, cells[i], families, late, options, guarded, given_up);
     teller.add([&, i] {
       const std::lock_guard lock(telling);

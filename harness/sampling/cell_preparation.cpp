@@ -67,7 +67,7 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
   if (cell.quantity == Quantity::radiance && cell.precision == Precision::float64) {
     add_light(prepared, *source);
   } else {
-    prepared.kernel = source->kernel(prepared.scene->medium->medium->channels(), cell.precision);
+    prepared.kernel = source->kernel(prepared.scene->medium->medium->channels(), cell.precision, cell.lanes);
     prepared.reason = why_not(cell, *prepared.scene, prepared.kernel.get());
   }
   if (prepared.reason.empty())

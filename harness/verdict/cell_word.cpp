@@ -147,6 +147,11 @@ std::string marked_word(const CellRecord& record) {
   return fmt::format("{} ({})", word, fmt::join(marks, ", "));
 }
 
+std::string standing_of(const CellRecord& record) {
+  if (kind_of(record) != Kind::unclaimed) return marked_word(record);
+  return record.claims == "biased" ? "claims nothing" : fmt::format("not tested (claims {})", record.claims);
+}
+
 std::string reason_of(const CellRecord& record) {
   if (record.status != Status::ok) return record.reason.empty() ? to_string(record.status) : record.reason;
   if (!record.verdict) return why_unclaimed(record);

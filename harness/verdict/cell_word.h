@@ -40,6 +40,9 @@ const char* verdict_word(Kind kind);
 /// The word for a cell with its marks, the same in every output: "PASS (by pilot, own mean)".
 std::string marked_word(const CellRecord& record);
 
+/// The same beside a rank, where nothing decided says what the tracker claims: "not tested (claims unbiased)".
+std::string standing_of(const CellRecord& record);
+
 /// Why a cell is not PASS: from its status, verdict, lookups above the bound, and laws.  What fails comes first.
 std::string reason_of(const CellRecord& record);
 

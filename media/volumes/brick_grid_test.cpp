@@ -1,4 +1,4 @@
-#include "media/volumes/brick_grid.h"
+#include "media/volumes/brick_grid_summary.h"
 
 #include <gtest/gtest.h>
 

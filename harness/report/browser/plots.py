@@ -88,7 +88,7 @@ class PlotsTest(PageTest):
             self.assertEqual(sum(text.startswith("no noise,") for text in texts), len(wrong))
         self.assertEqual(self.js("return report.cells.filter((cell) => cell.cost && isExact(cell)).length"), len(still) - len(wrong))
         best = self.js("""return matrixOf(matrixViews.variance_x_lookups).entries.flat()
-            .filter(({ cell, relative }) => cell && relative !== null && relative < 1 && claimsUnbiased(cell)).length""")
+            .filter(({ cell, relative }) => cell && relative !== null && relative < 1 && standsUnbiased(cell)).length""")
         self.assertEqual(best, 0)
         self.detail = f"{len(wrong)} of {len(still)} without noise are wrong"
 

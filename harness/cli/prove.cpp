@@ -1,0 +1,99 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "harness/analysis/check.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/signals.h"
+#include "harness/io/file_io.h"
+#include "harness/io/json_input.h"
+#include "harness/io/outputs.h"
+#include "harness/io/results_json.h"
+#include "harness/report/prove_text.h"
+#include "harness/run/battery.h"
+#include "harness/run/medium_contract.h"
+#include "harness/run/progress.h"
+#include "harness/run/provenance.h"
+#include "harness/run/run.h"
+
+namespace nullmark {
+namespace {
+
+/// Cells that are not done by then are left undecided.
+constexpr double kSeconds = 50, kQuickSeconds = 15;
+
+/// "ratio", or an object as in a configuration.
+Json component_argument(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t\n");
+  return first != std::string::npos && text[first] == '{' ? parse_json(text, "prove") : Json(text);
+}
+
+RunRecord run_battery(const ProveCommand& command, const Battery& battery) {
+  RunOptions options;
+  options.timing = false;
+  options.threads = command.threads;
+  options.time_budget = command.quick ? kQuickSeconds : kSeconds;
+  options.interrupted = &received_signal;
+  RunContext context;
+  context.command_line = command.command_line;
+  context.threads = command.threads;
+  context.selected = static_cast<std::size_t>(std::count(battery.selected.begin(), battery.selected.end(), true));
+  RunRecord run;
+  {
+    Progress progress(context.selected, Progress::Lines::none);
+    RunObserver observer;
+    observer.cell_done = [&](const CellRecord& record, std::size_t done, std::size_t total) {
+      progress.cell_done(record, done, total);
+    };
+    observer.progress = [&](const CellRecord& record, double fraction) { progress.cell_progress(record, fraction); };
+    observer.timing = [](double) {};
+    observer.cell_timed = [](const CellRecord&) {};
+    observer.verdict_share = observer.statistics_share = [](double) {};
+    observer.warning = [&](const std::string& message) { progress.warning(message); };
+    run.cells = run_plan(battery.plan, battery.selected, {}, options, observer);
+  }
+  run.name = battery.plan.name;
+  run.config_text = battery.plan.config_text;
+  run.provenance = make_provenance(context, std::chrono::system_clock::now());
+  // Cells that the tracker's parameters do not allow were never to run.
+  run.provenance["filter"] = "\"scenes that fit\"";
+  return run;
+}
+
+ExitCode prove_medium_alone(const ProveCommand& command, std::string& text) {
+  bool kept = true;
+  for (const ContractFinding& finding : check_medium(component_argument(command.medium))) {
+    text += fmt::format("{} {}{}\n", finding.kept ? "PASS" : "FAIL", finding.what,
+                        finding.detail.empty() ? "" : ": " + finding.detail);
+    kept &= finding.kept;
+  }
+  return kept ? ExitCode::ok : ExitCode::bias_proven;
+}
+
+}  // namespace
+
+ExitCode prove_command(const ProveCommand& command) {
+  refuse_overwriting({}, {command.output});
+  std::string text;
+  ExitCode medium_exit = ExitCode::ok;
+  if (!command.medium.empty()) {
+    medium_exit = prove_medium_alone(command, text);
+    fmt::print("medium {}\n{}\n", command.medium, text);
+  }
+  const std::string estimator = command.estimator.empty() ? "ratio" : command.estimator;
+  const Battery battery = make_battery(component_argument(estimator),
+                                       command.medium.empty() ? Json() : component_argument(command.medium), command.quick);
+  catch_signals();
+  RunRecord run = run_battery(command, battery);
+  const Summary summary = summarise(run);
+  fmt::print("estimator {}\n{}", estimator, scenes_text(run));
+  for (const std::string& one : battery.left_out) fmt::print("not tried: {}\n", one);
+  fmt::print("{}", findings_text(run));
+  for (const std::string& one : summary.undecided_trackers) fmt::print("{}\n", one);
+  if (!summary.nothing_proven.empty()) fmt::print("{}\n", summary.nothing_proven);
+  if (!command.output.empty()) write_atomically(command.output, results_text(run));
+  if (summary.exit == ExitCode::bias_proven || medium_exit != ExitCode::ok) return ExitCode::bias_proven;
+  return summary.exit;
+}
+
+}  // namespace nullmark

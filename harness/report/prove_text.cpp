@@ -1,0 +1,88 @@
+#include "harness/report/prove_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "harness/io/text.h"
+#include "harness/verdict/cell_word.h"
+
+namespace nullmark {
+namespace {
+
+/// What a PASS excludes: |bias| relative to the mean reference, the largest over its tests.
+std::optional<Real> excluded(const CellRecord& record) {
+  if (kind_of(record) != Kind::pass) return std::nullopt;
+  Real largest = 0;
+  for (const TestRecord& test : record.verdict->tests)
+    if (test.channel >= 0 && test.reference != 0)
+      largest = std::max(largest, (test.deterministic() ? test.largest_error : test.epsilon) / std::abs(test.reference));
+  return largest;
+}
+
+struct Part {
+  std::size_t cells = 0, pass = 0, fail = 0, open = 0, violated = 0, other = 0;
+  Real least = kInfinity, most = 0;  ///< biases that PASSes exclude
+
+  void add(const CellRecord& record) {
+    ++cells;
+    const Kind kind = kind_of(record);
+    pass += kind == Kind::pass;
+    fail += kind == Kind::fail || kind == Kind::error;
+    open += kind == Kind::expected_open || kind == Kind::unexpected_open;
+    violated += kind == Kind::violated;
+    other += kind == Kind::unclaimed || kind == Kind::not_run;
+    if (const auto bias = excluded(record)) {
+      least = std::min(least, *bias);
+      most = std::max(most, *bias);
+    }
+  }
+
+  std::string bias_text() const {
+    if (pass == 0) return "-";
+    const auto percent = [](Real x) { return x < 1e-6 ? std::string("rounding") : fmt::format("{:.2g} %", 100 * x); };
+    return percent(least) == percent(most) ? percent(most) : fmt::format("{} to {}", percent(least), percent(most));
+  }
+};
+
+}  // namespace
+
+std::string scenes_text(const RunRecord& run) {
+  std::vector<std::pair<std::string, Part>> parts;
+  for (const CellRecord& record : run.cells) {
+    if (parts.empty() || parts.back().first != record.cell.experiment) parts.emplace_back(record.cell.experiment, Part());
+    parts.back().second.add(record);
+  }
+  std::vector<std::vector<std::string>> lines = {
+      {"scenes", "cells", "PASS", "FAIL", "undecided", "VIOLATED", "not tested", "|bias| excluded"}};
+  for (const auto& [name, part] : parts)
+    lines.push_back({name, fmt::to_string(part.cells), fmt::to_string(part.pass), fmt::to_string(part.fail),
+                     fmt::to_string(part.open), fmt::to_string(part.violated), fmt::to_string(part.other), part.bias_text()});
+  return aligned(lines, 1);
+}
+
+std::string findings_text(const RunRecord& run) {
+  struct Found {
+    const CellRecord* first = nullptr;
+    std::size_t count = 0;
+  };
+  std::map<std::pair<bool, std::string>, Found> found;
+  for (const CellRecord& record : run.cells) {
+    const Kind kind = kind_of(record);
+    const bool failed = kind == Kind::fail || kind == Kind::error || kind == Kind::violated;
+    if (!failed && kind != Kind::unexpected_open && kind != Kind::expected_open) continue;
+    Found& part = found[{!failed, record.cell.experiment}];
+    if (part.count++ == 0) part.first = &record;
+  }
+  std::string text;
+  for (const auto& [key, part] : found)
+    text +=
+        fmt::format("{}: {}{}\n  {}\n", verdict_word(kind_of(*part.first)), part.first->cell.name,
+                    part.count > 1 ? fmt::format(" and {} more of these scenes", part.count - 1) : "", reason_of(*part.first));
+  return text;
+}
+
+}  // namespace nullmark
