@@ -369,6 +369,7 @@ void visit_fields(Visit& visit, CellRecord& record) {
   });
   visit.lenient("image_maximum", record.cell.image_maximum);
   visit.sparse("instructions", record.instructions, "instructions of drawing all samples, counted in a simulator");
+  visit.sparse("last_level_misses", record.last_level_misses, "of data, in the same simulator's caches");
   visit.when("images", record.cell.images, record.images);
 }
 

@@ -31,6 +31,7 @@ std::string statistics_text(const RunRecord& run) {
     Json json = cell_json(record);
     json.erase("time");
     json.erase("instructions");
+    json.erase("last_level_misses");
     json.erase("images");
     text += json.dump() + "\n";
   }

@@ -142,7 +142,8 @@ struct CellRecord {
   /// Variance of the lookups of one sample, averaged over the rays.  If every ray has one sample: variance over all rays, which
   /// is larger.
   std::optional<Real> lookups_variance;
-  std::optional<std::uint64_t> instructions;  ///< of drawing the samples, counted in a simulator; see performance_gate.md
+  std::optional<std::uint64_t> instructions;       ///< of drawing the samples, counted in a simulator; see performance_gate.md
+  std::optional<std::uint64_t> last_level_misses;  ///< of the data, in the same simulator's caches
   std::uint64_t majorant_violations = 0, nonfinite = 0;
   std::optional<Real> largest_violation;  ///< largest mu / mub above 1
   std::optional<Real> largest_sample;     ///< max |X| of the finite samples, all outputs together

@@ -62,6 +62,7 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
     record.draws = 9223372036854775807;
     record.lookups_variance = 1. / 3;
     record.instructions = 9007199254740993;
+    record.last_level_misses = 9007199254740991;
     record.majorant_violations = 3;
     record.largest_violation = 1 + 2.220446049250313e-16;
     record.time = TimeRecord{next(), next(), next(), next(), next(), 2, 1, 64, {next(), next()}, next()};
