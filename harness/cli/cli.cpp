@@ -17,6 +17,7 @@
 #include "harness/io/json_input.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
+#include "harness/performance_gate/required.h"
 #include "harness/registry/estimator_entry.h"
 #include "harness/report/check_text.h"
 #include "harness/report/comparison_text.h"
@@ -241,13 +242,20 @@ class CommandLine {
     command->add_option("RESULTS", gate_.results, "Results file")->required();
     command
         ->add_option("--threshold", gate_.threshold,
-                     "Percent that a change must exceed; defaults of tiers 1 to 4: 0, 1, .2 to 1 (by history), 5")
+                     "Percent that a change must exceed; defaults of tiers 1 to 6: 0, 1, .2 to 1 (by history), 5, 5, 1")
         ->check(CLI::Range(0., 1000.));
+    CLI::Option* require =
+        command
+            ->add_option("--require", gate_.require,
+                         fmt::format("Tiers that must be compared, with commas: {}; left out: all that the baseline holds",
+                                     fmt::join(required_words(), ",")))
+            ->delimiter(',')
+            ->allow_extra_args(false);
     CLI::Option* blocks =
         command->add_option("--blocks", gate_.blocks, "Folder of scripts/compare-builds: compare wall time as well");
     command->add_flag("--quiet-machine", gate_.quiet_machine, "Count a slower wall time as a regression, not only as a remark")
         ->needs(blocks);
-    command->add_flag("--update", gate_.update, "Make the results the baseline")->excludes(blocks);
+    command->add_flag("--update", gate_.update, "Make the results the baseline")->excludes(blocks)->excludes(require);
     command->add_option("--junit", gate_.junit, "Also write a JUnit report");
     command->add_option("--markdown", gate_.markdown, "Also write a summary for a pull request");
   }

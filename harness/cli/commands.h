@@ -44,11 +44,12 @@ ExitCode replay_command(const ReplayCommand& command);
 
 /// `nullmark gate`.
 struct GateCommand {
-  std::string baseline;             ///< results, a baseline, or a folder of baselines
-  std::string results;              ///< of `nullmark run`
-  std::optional<double> threshold;  ///< percent; replaces the thresholds of the tiers
-  std::string blocks;               ///< folder of interleaved runs; empty: no wall time
-  std::string junit, markdown;      ///< files; empty: none
+  std::string baseline;              ///< results, a baseline, or a folder of baselines
+  std::string results;               ///< of `nullmark run`
+  std::optional<double> threshold;   ///< percent; replaces the thresholds of the tiers
+  std::vector<std::string> require;  ///< words of required.h; empty: what the baseline holds
+  std::string blocks;                ///< folder of interleaved runs; empty: no wall time
+  std::string junit, markdown;       ///< files; empty: none
   bool update = false, quiet_machine = false;
 };
 ExitCode gate_command(const GateCommand& command);

@@ -8,15 +8,40 @@
 #include "harness/io/outputs.h"
 #include "harness/performance_gate/baseline.h"
 #include "harness/performance_gate/report.h"
+#include "harness/performance_gate/required.h"
 #include "harness/performance_gate/wall_time.h"
 
 namespace nullmark {
 namespace {
 
-void deliver(const GateCommand& command, const PerformanceReport& report) {
+void write_files(const GateCommand& command, const PerformanceReport& report) {
   if (!command.junit.empty()) write_atomically(command.junit, performance_junit(report));
   if (!command.markdown.empty()) write_atomically(command.markdown, performance_markdown(report));
+}
+
+void deliver(const GateCommand& command, const PerformanceReport& report) {
+  write_files(command, report);
   fmt::print("{}", performance_text(report));
+}
+
+/// Says what stands in the way, on the terminal and in the files.
+ExitCode without_baseline(const GateCommand& command, const Counts& fresh, const std::string& remedy) {
+  PerformanceReport report;
+  report.name = fresh.name;
+  report.before = command.baseline;
+  report.after = fresh.source;
+  report.missing = {remedy};
+  write_files(command, report);
+  fmt::print(stderr, "nullmark: {}\n", remedy);
+  return report.exit();
+}
+
+/// The tiers that `--require` names, if it is there.
+std::optional<std::vector<Tier>> required_tiers(const GateCommand& command) {
+  if (command.require.empty()) return std::nullopt;
+  std::vector<Tier> tiers;
+  for (const std::string& word : command.require) tiers.push_back(required_tier(word));
+  return tiers;
 }
 
 /// Makes the results the baseline of their configuration and build, and shows what that changes.
@@ -49,6 +74,7 @@ ExitCode update(const GateCommand& command, const Counts& fresh, std::optional<R
 
 ExitCode gate_command(const GateCommand& command) {
   refuse_overwriting({command.results, command.baseline, command.blocks}, {command.junit, command.markdown});
+  const std::optional<std::vector<Tier>> required = required_tiers(command);
   const Counts fresh = read_counts(command.results);
   std::optional<Real> threshold;
   if (command.threshold) threshold = *command.threshold / 100;
@@ -58,15 +84,13 @@ ExitCode gate_command(const GateCommand& command) {
   const std::optional<Counts> before = std::filesystem::is_directory(command.baseline)
                                            ? find_baseline(command.baseline, fresh, remedy)
                                            : std::optional(read_counts(command.baseline));
-  if (!before) {
-    fmt::print(stderr, "nullmark: {}\n", remedy);
-    return ExitCode::nothing_ran;
-  }
+  if (!before) return without_baseline(command, fresh, remedy);
   PerformanceReport report = compare_counts(*before, fresh, threshold);
   if (!command.blocks.empty()) {
     const std::vector<GateRow> rows = compare_wall_time(read_blocks(command.blocks), threshold, command.quiet_machine);
     report.rows.insert(report.rows.end(), rows.begin(), rows.end());
   }
+  report.missing = missing_tiers(report, *before, fresh, required);
   deliver(command, report);
   return report.exit();
 }

@@ -21,6 +21,9 @@ namespace {
 constexpr int kSchema = 1;
 constexpr const char* kSchemaKey = "nullmark_baseline";
 
+/// Of results' provenance, as scripts/count-instructions writes it, and of baselines.
+constexpr const char* kStartUpKey = "start_up_instructions";
+
 /// Refreshes that a history remembers.
 constexpr std::size_t kHistory = 20;
 
@@ -37,11 +40,25 @@ std::string setting_of(const CellRecord& record) {
   return fmt::format("{:016x}", fnv1a(setting.dump()));
 }
 
+/// Null where the provenance does not say.
+Json provenance_of(const RunRecord& run, const char* key) {
+  const auto at = run.provenance.find(key);
+  return at == run.provenance.end() ? Json() : known_json(at->second);
+}
+
+/// Hash of a configuration as a run writes it, cell by cell, without the cells' seeds: another seed has the same expectations.
+std::string seedless_hash(const std::string& config_text) {
+  Json config = known_json(config_text);
+  if (!config.is_object() || !config.contains("experiments")) return config_hash(config_text);
+  for (Json& experiment : config["experiments"])
+    if (experiment.is_object() && experiment.contains("include"))
+      for (Json& cell : experiment["include"])
+        if (cell.is_object()) cell.erase("seed");
+  return config_hash(config.dump());
+}
+
 BuildKey build_of(const RunRecord& run) {
-  const auto json = [&](const char* key) {
-    const auto at = run.provenance.find(key);
-    return at == run.provenance.end() ? Json() : known_json(at->second);
-  };
+  const auto json = [&](const char* key) { return provenance_of(run, key); };
   const auto text = [](const Json& object, const char* key) {
     return object.is_object() && object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : std::string();
   };
@@ -78,6 +95,7 @@ CellCounts read_cell_counts(const JsonNode& node) {
   cell.lookups_variance = real("lookups_variance");
   cell.lookups_theory = real("lookups_theory");
   if (node.has("instructions")) cell.instructions = whole("instructions");
+  if (node.has("last_level_misses")) cell.misses = whole("last_level_misses");
   if (node.has("instruction_history"))
     for (const JsonNode& change : node["instruction_history"].elements()) cell.instruction_history.push_back(change.number());
   return cell;
@@ -99,6 +117,7 @@ Counts read_baseline(const JsonNode& top) {
                                     {"libc", &BuildKey::libc},
                                     {"cpu", &BuildKey::cpu}})
     counts.build.*member = build[key].string();
+  if (top.has(kStartUpKey)) counts.start_up = top[kStartUpKey].unsigned_integer(0);
   for (const JsonNode& cell : top["cells"].elements()) counts.cells.push_back(read_cell_counts(cell));
   return counts;
 }
@@ -115,11 +134,34 @@ Json cell_counts_json(const CellCounts& cell) {
   if (cell.lookups_variance) json["lookups_variance"] = *cell.lookups_variance;
   if (cell.lookups_theory) json["lookups_theory"] = *cell.lookups_theory;
   if (cell.instructions) json["instructions"] = *cell.instructions;
+  if (cell.misses) json["last_level_misses"] = *cell.misses;
   if (!cell.instruction_history.empty()) json["instruction_history"] = cell.instruction_history;
   return json;
 }
 
 bool is_json(const std::filesystem::path& path) { return path.extension() == ".json"; }
+
+/// Throws InputError where the baseline of the same configuration has what the new counts lack.
+void refuse_losses(const Counts& before, const Counts& after) {
+  if (before.config_hash != after.config_hash) return;
+  std::map<std::string, const CellCounts*> later;
+  for (const CellCounts& cell : after.cells) later.emplace(cell.name, &cell);
+  for (const CellCounts& old : before.cells) {
+    const auto at = later.find(old.name);
+    if (at == later.end())
+      throw InputError(
+          fmt::format("{}: has no cell \"{}\", which the baseline has; run the whole configuration", after.source, old.name));
+    const auto refuse = [&](const char* what) {
+      throw InputError(fmt::format("{}: has no {} of \"{}\", which the baseline has; scripts/count-instructions counts them",
+                                   after.source, what, old.name));
+    };
+    if (old.instructions && !at->second->instructions) refuse("instructions");
+    if (old.misses && !at->second->misses) refuse("cache misses");
+  }
+  if (before.start_up && !after.start_up)
+    throw InputError(after.source +
+                     ": has no instructions of a start, which the baseline has; scripts/count-instructions counts them");
+}
 
 }  // namespace
 
@@ -127,8 +169,11 @@ Counts counts_of(const RunRecord& run, const std::string& file) {
   Counts counts;
   counts.source = file;
   counts.name = run.name;
-  counts.config_hash = config_hash(run.config_text);
+  counts.config_hash = seedless_hash(run.config_text);
   counts.build = build_of(run);
+  for (const char* selection : {"filter", "covering", "shard"}) counts.partial |= run.provenance.contains(selection);
+  if (const Json start_up = provenance_of(run, kStartUpKey); start_up.is_number_unsigned())
+    counts.start_up = start_up.get<std::uint64_t>();
   for (const CellRecord& record : run.cells) {
     if (record.status != Status::ok || record.samples == 0) continue;
     CellCounts cell;
@@ -145,6 +190,7 @@ Counts counts_of(const RunRecord& run, const std::string& file) {
     cell.lookups_variance = record.lookups_variance;
     cell.lookups_theory = record.lookups_theory;
     cell.instructions = record.instructions;
+    cell.misses = record.last_level_misses;
     counts.cells.push_back(std::move(cell));
   }
   refuse_repeated_names(counts);
@@ -197,35 +243,24 @@ std::string baseline_text(const Counts& counts) {
   const BuildKey& build = counts.build;
   const Json key = {{"compiler", build.compiler}, {"march", build.march}, {"simd", build.simd},
                     {"libc", build.libc},         {"cpu", build.cpu},     {"flags", build.flags}};
-  std::string text = fmt::format("{{\n\"{}\": {},\n\"name\": {},\n\"config_hash\": \"{}\",\n\"build\": {},\n\"cells\": [",
-                                 kSchemaKey, kSchema, Json(counts.name).dump(), counts.config_hash, key.dump());
+  std::string text = fmt::format("{{\n\"{}\": {},\n\"name\": {},\n\"config_hash\": \"{}\",\n\"build\": {},\n", kSchemaKey,
+                                 kSchema, Json(counts.name).dump(), counts.config_hash, key.dump());
+  if (counts.start_up) text += fmt::format("\"{}\": {},\n", kStartUpKey, *counts.start_up);
+  text += "\"cells\": [";
   for (std::size_t i = 0; i < counts.cells.size(); ++i)
     text += fmt::format("{}\n{}", i == 0 ? "" : ",", cell_counts_json(counts.cells[i]).dump());
   return text + "\n]\n}\n";
 }
 
 Counts refreshed(const Counts& before, Counts after) {
+  refuse_losses(before, after);
   std::map<std::string, CellCounts*> later;
   for (CellCounts& cell : after.cells) later.emplace(cell.name, &cell);
-  const bool same_configuration = before.config_hash == after.config_hash;
   for (const CellCounts& old : before.cells) {
     const auto at = later.find(old.name);
-    if (at == later.end()) {
-      if (same_configuration)
-        throw InputError(
-            fmt::format("{}: has no cell \"{}\", which the baseline has; run the whole configuration", after.source, old.name));
-      continue;
-    }
+    if (at == later.end()) continue;
     CellCounts& fresh = *at->second;
-    if (!old.instructions || old.samples == 0) continue;
-    if (!fresh.instructions) {
-      if (same_configuration)
-        throw InputError(
-            fmt::format("{}: has no instructions of \"{}\", which the baseline has; scripts/count-instructions counts "
-                        "them",
-                        after.source, old.name));
-      continue;
-    }
+    if (!old.instructions || old.samples == 0 || !fresh.instructions) continue;
     if (old.id != fresh.id) continue;
     const Real change = std::abs(static_cast<Real>(*fresh.instructions) / static_cast<Real>(*old.instructions) - 1);
     if (!(change <= instruction_threshold(old.instruction_history))) continue;

@@ -26,7 +26,7 @@ std::string baseline_text(const Counts& counts);
 
 /// What the next baseline is: the new counts, with the history of the instructions carried on.  Changes within a cell's threshold
 /// join its history; a change beyond it is a change of the code, whose history begins anew.  Throws InputError where the new
-/// counts would lose cells or instructions that the old baseline of the same configuration has.
+/// counts would lose cells, instructions, misses or the start-up that the old baseline of the same configuration has.
 Counts refreshed(const Counts& before, Counts after);
 
 }  // namespace nullmark

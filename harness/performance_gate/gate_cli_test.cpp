@@ -66,6 +66,48 @@ TEST_F(GateCli, FiftySeedsOfTheSameProgramAreNoRegression) {
   }
 }
 
+/// Results as scripts/count-instructions leaves them, of made-up counts.
+std::string counted(std::string text) {
+  text = std::regex_replace(text, std::regex("\"rng_draws\":"), "\"instructions\":90000000,\"last_level_misses\":70000,$&");
+  return std::regex_replace(text, std::regex("\n\"provenance\": \\{"), "$&\"start_up_instructions\":50000000,");
+}
+
+TEST_F(GateCli, WhatTheBaselineHoldsMustBeCompared) {
+  write("counted.json", counted(read("old.json")));
+  ASSERT_EQ(read_counts((folder_ / "counted.json").string()).start_up, 50'000'000u);
+  std::filesystem::create_directory(folder_ / "baseline");
+  ASSERT_EQ(gate("baseline counted.json --update"), 0) << read("err");
+  EXPECT_EQ(gate("baseline counted.json"), 0) << read("out");
+  EXPECT_NE(read("out").find("tier 5, cache misses: 2 same\ntier 6, start-up: 1 same\n"), std::string::npos) << read("out");
+
+  EXPECT_EQ(gate("baseline old.json --junit gate.xml --markdown gate.md"), 5);
+  EXPECT_EQ(read("out").find("no performance regression proven"), std::string::npos) << read("out");
+  EXPECT_NE(read("gate.xml").find("errors=\"3\""), std::string::npos) << read("gate.xml");
+  EXPECT_NE(read("gate.md").find("missing: instructions"), std::string::npos) << read("gate.md");
+  EXPECT_EQ(gate("baseline old.json --require counts,expected"), 0) << read("out");
+  EXPECT_EQ(gate("baseline counted.json --require counts,instructions,misses,start-up"), 0) << read("out");
+  EXPECT_EQ(gate("baseline old.json --require counts,instructions"), 5);
+  EXPECT_EQ(gate("old.json old.json --require instructions"), 5);
+  ASSERT_EQ(run("run c.json -o part.json --filter ^ratio"), 0);
+  EXPECT_EQ(gate("old.json part.json"), 0) << "cells that were not asked for are not missed: " << read("out");
+}
+
+TEST_F(GateCli, ABaselineIsThatOfEverySeed) {
+  std::filesystem::create_directory(folder_ / "baseline");
+  ASSERT_EQ(gate("baseline old.json --update"), 0) << read("err");
+  ASSERT_EQ(run("run c.json -o seed.json --seed 9"), 0);
+  EXPECT_EQ(gate("baseline seed.json"), 0) << read("err");
+  EXPECT_NE(read("out").find("other seed"), std::string::npos) << read("out");
+  EXPECT_EQ(gate("baseline seed.json --require counts"), 5) << read("out");
+}
+
+TEST_F(GateCli, WithoutABaselineTheFilesSaySo) {
+  std::filesystem::create_directory(folder_ / "baseline");
+  EXPECT_EQ(gate("baseline old.json --junit gate.xml --markdown gate.md"), 5);
+  EXPECT_NE(read("gate.xml").find("no baseline of configuration c"), std::string::npos) << read("gate.xml");
+  EXPECT_NE(read("gate.md").find("nothing could be compared"), std::string::npos) << read("gate.md");
+}
+
 TEST_F(GateCli, BaselinesAreMadeFoundAndRefreshed) {
   std::filesystem::create_directory(folder_ / "baseline");
   EXPECT_EQ(gate("baseline old.json"), 5);
@@ -114,7 +156,7 @@ TEST_F(GateCli, BadInputIsOneLineAndCodeTwo) {
         "foreign.json old.json", "old.json foreign.json", "future.json old.json", "baseline.json old.json", "bad old.json",
         "old.json old.json --threshold -1", "old.json old.json --threshold much", "old.json old.json --blocks blocks",
         "old.json old.json --blocks nowhere", "old.json old.json --quiet-machine", "old.json old.json --update",
-        "old.json old.json --junit nowhere/gate.xml"}) {
+        "old.json old.json --junit nowhere/gate.xml", "old.json old.json --require time"}) {
     EXPECT_EQ(gate(arguments), 2) << arguments;
     const std::string error = read("err");
     EXPECT_EQ(error.rfind("nullmark: ", 0), 0u) << arguments << ": " << error;

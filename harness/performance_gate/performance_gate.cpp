@@ -12,6 +12,9 @@ namespace {
 
 constexpr Real kCountsThreshold = 0, kExpectedThreshold = 0.01;
 constexpr Real kLeastInstructions = 0.002, kMostInstructions = 0.01;
+constexpr Real kMissesThreshold = 0.05, kStartUpThreshold = 0.01;
+
+constexpr const char* kOneSide = "counted on one side only";
 
 /// Relative differences of computed expectations up to here are quadrature and rounding.
 constexpr Real kSameTheory = 1e-6;
@@ -58,6 +61,21 @@ class Comparison {
     counts(before, after);
     expected(before, after);
     instructions(before, after);
+    misses(before, after);
+  }
+
+  /// A start is no cell: its row has a name of its own.
+  void compare_start_up(const Counts& before, const Counts& after) {
+    CellCounts start;
+    start.name = "start-up of a run";
+    if (!before.start_up && !after.start_up) return;
+    if (!before.start_up || !after.start_up) return add_not_compared(start.name, Tier::start_up, "instructions", kOneSide);
+    if (!same_build_ || before.config_hash != after.config_hash)
+      return add_not_compared(start.name, Tier::start_up, "instructions", "another build or configuration");
+    GateRow one = row(start, Tier::start_up, "instructions", static_cast<Real>(*before.start_up),
+                      static_cast<Real>(*after.start_up), kStartUpThreshold);
+    if (one.finding == GateResult::changed) one.finding = GateResult::same;
+    rows.push_back(std::move(one));
   }
 
   void add_not_compared(const std::string& cell, Tier tier, const std::string& metric, const std::string& note) {
@@ -165,8 +183,7 @@ class Comparison {
 
   void instructions(const CellCounts& before, const CellCounts& after) {
     if (!before.instructions || !after.instructions) {
-      if (before.instructions || after.instructions)
-        add_not_compared(after.name, Tier::instructions, "instructions", "counted on one side only");
+      if (before.instructions || after.instructions) add_not_compared(after.name, Tier::instructions, "instructions", kOneSide);
       return;
     }
     if (!exact_) {
@@ -176,6 +193,18 @@ class Comparison {
     GateRow one = row(after, Tier::instructions, "instructions", per_sample(*before.instructions, before),
                       per_sample(*after.instructions, after), instruction_threshold(before.instruction_history));
     if (one.finding == GateResult::changed) one.finding = GateResult::same;
+    rows.push_back(std::move(one));
+  }
+
+  void misses(const CellCounts& before, const CellCounts& after) {
+    constexpr const char* metric = "last-level misses";
+    if (!before.misses && !after.misses) return;
+    if (!before.misses || !after.misses) return add_not_compared(after.name, Tier::misses, metric, kOneSide);
+    if (!exact_) return add_not_compared(after.name, Tier::misses, metric, "another build, seed or number of samples");
+    const Real then = per_sample(*before.misses, before), now = per_sample(*after.misses, after);
+    GateRow one = row(after, Tier::misses, metric, then, now, kMissesThreshold);
+    // Addresses move a few misses about; where a sample has next to none, that is no change.
+    if (one.finding == GateResult::changed || std::abs(now - then) < kLeastMisses) one.finding = GateResult::same;
     rows.push_back(std::move(one));
   }
 
@@ -212,7 +241,12 @@ std::size_t PerformanceReport::count(GateResult finding) const {
 
 ExitCode PerformanceReport::exit() const {
   if (count(GateResult::regression) > 0) return ExitCode::regression;
-  return count(GateResult::not_compared) == rows.size() ? ExitCode::nothing_ran : ExitCode::ok;
+  return !missing.empty() || count(GateResult::not_compared) == rows.size() ? ExitCode::nothing_ran : ExitCode::ok;
+}
+
+bool PerformanceReport::compared(Tier tier) const {
+  return std::any_of(rows.begin(), rows.end(),
+                     [&](const GateRow& row) { return row.tier == tier && row.finding != GateResult::not_compared; });
 }
 
 Real instruction_threshold(std::vector<Real> history) {
@@ -245,6 +279,7 @@ PerformanceReport compare_counts(const Counts& before, const Counts& after, std:
   for (const CellCounts& cell : before.cells)
     if (earlier.count(cell.name) > 0)
       comparison.add_not_compared(cell.name, Tier::counts, "counts", "only on the old side; cells are matched by name");
+  comparison.compare_start_up(before, after);
   report.rows = std::move(comparison.rows);
   return report;
 }
@@ -258,9 +293,13 @@ const char* to_string(Tier tier) {
     case Tier::instructions:
       return "instructions";
     case Tier::wall_time:
+      return "wall time";
+    case Tier::misses:
+      return "cache misses";
+    case Tier::start_up:
       break;
   }
-  return "wall time";
+  return "start-up";
 }
 
 const char* to_string(GateResult finding) {

@@ -156,6 +156,48 @@ TEST(PerformanceGate, InstructionsBeyondTheirThresholdAreARegression) {
   EXPECT_EQ(compared(0.03, {0, 0.1, 0.2, 0.3}), GateResult::regression) << "no history hides 3 %";
 }
 
+TEST(PerformanceGate, MissesBeyondFivePercentOfTheSameWalksAreARegression) {
+  const auto compared = [](std::uint64_t before, std::uint64_t after, std::optional<Real> threshold = {}) {
+    Counts old = example(), fresh = example();
+    only(old).misses = before, only(fresh).misses = after;
+    return finding(compare_counts(old, fresh, threshold), Tier::misses, "last-level misses");
+  };
+  EXPECT_EQ(compared(1'000'000, 1'060'000), GateResult::regression);
+  EXPECT_EQ(compared(1'000'000, 1'040'000), GateResult::same);
+  EXPECT_EQ(compared(1'000'000, 1'060'000, 0.1), GateResult::same);
+  EXPECT_EQ(compared(1'000'000, 30'000), GateResult::better);
+  // .01 misses a sample more, on next to none; then .06 more.
+  EXPECT_EQ(compared(100, 1'100), GateResult::same);
+  EXPECT_EQ(compared(100, 6'100), GateResult::regression);
+  EXPECT_EQ(compared(0, 6'100), GateResult::regression);
+}
+
+TEST(PerformanceGate, MissesOfOtherWalksAreNotCompared) {
+  Counts before = example(), after = example();
+  only(before).misses = 1'000'000, only(after).misses = 9'000'000;
+  only(after).id = "another seed";
+  EXPECT_EQ(finding(compare_counts(before, after), Tier::misses, "last-level misses"), GateResult::not_compared);
+  only(after) = only(before);
+  only(after).misses.reset();
+  EXPECT_EQ(finding(compare_counts(before, after), Tier::misses, "last-level misses"), GateResult::not_compared);
+}
+
+TEST(PerformanceGate, AStartOfOnePercentMoreIsARegression) {
+  const auto compared = [](std::uint64_t after) {
+    Counts old = example(), fresh = example();
+    old.start_up = 100'000, fresh.start_up = after;
+    return finding(compare_counts(old, fresh), Tier::start_up, "instructions");
+  };
+  EXPECT_EQ(compared(100'000), GateResult::same);
+  EXPECT_EQ(compared(100'900), GateResult::same);
+  EXPECT_EQ(compared(101'100), GateResult::regression);
+  EXPECT_EQ(compared(90'000), GateResult::better);
+  Counts old = example(), fresh = example();
+  old.start_up = 100'000, fresh.start_up = 200'000;
+  fresh.config_hash = "longer";
+  EXPECT_EQ(finding(compare_counts(old, fresh), Tier::start_up, "instructions"), GateResult::not_compared);
+}
+
 TEST(PerformanceGate, ThresholdIsTheUpperFenceOfTheHistory) {
   EXPECT_EQ(instruction_threshold({}), 0.002);
   EXPECT_EQ(instruction_threshold({0.009, 0.009, 0.009}), 0.002);
@@ -205,13 +247,34 @@ TEST(PerformanceGateBaseline, HistoryGoesOnWhereTheCodeDidNotChange) {
 }
 
 TEST(PerformanceGateBaseline, RefreshingLosesNoCellAndNoCount) {
-  Counts after = example();
+  Counts before = example();
+  only(before).misses = before.start_up = 1000;
+  Counts after = before;
+  EXPECT_NO_THROW(refreshed(before, after));
   only(after).instructions.reset();
-  EXPECT_THROW(refreshed(example(), after), InputError);
+  EXPECT_THROW(refreshed(before, after), InputError);
+  after = before;
+  only(after).misses.reset();
+  EXPECT_THROW(refreshed(before, after), InputError);
+  after = before;
+  after.start_up.reset();
+  EXPECT_THROW(refreshed(before, after), InputError);
   after.cells.clear();
   EXPECT_THROW(refreshed(example(), after), InputError);
   after.config_hash = "another configuration";
   EXPECT_NO_THROW(refreshed(example(), after));
+}
+
+TEST(PerformanceGateBaseline, AnotherSeedIsNotAnotherConfiguration) {
+  const auto hash = [](const char* cell) {
+    RunRecord run;
+    run.config_text = std::string(R"({"nullmark":"config/2","experiments":[{"name":"e","include":[)") + cell + "]}]}";
+    return counts_of(run, "results").config_hash;
+  };
+  EXPECT_EQ(hash(R"({"estimator":"ratio","seed":1})"), hash(R"({"estimator":"ratio","seed":2})"));
+  EXPECT_NE(hash(R"({"estimator":"ratio","seed":1})"), hash(R"({"estimator":"delta","seed":1})"));
+  // The seed of a medium is another medium.
+  EXPECT_NE(hash(R"({"medium":{"type":"fractal_noise","seed":1}})"), hash(R"({"medium":{"type":"fractal_noise","seed":2}})"));
 }
 
 TEST(PerformanceGateBaseline, FilesAreNamedByConfigurationAndBuildButNotByItsHash) {

@@ -11,7 +11,6 @@
 namespace nullmark {
 namespace {
 
-constexpr Tier kTiers[] = {Tier::counts, Tier::expected, Tier::instructions, Tier::wall_time};
 constexpr GateResult kGravest[] = {GateResult::regression, GateResult::slower, GateResult::noisy,        GateResult::undecided,
                                    GateResult::changed,    GateResult::better, GateResult::not_compared, GateResult::same};
 
@@ -94,11 +93,30 @@ std::vector<std::string> left_out(const PerformanceReport& report) {
   return lines;
 }
 
+/// "exact counts, instructions": the tiers that compared something, or those that did not.
+std::string tiers(const PerformanceReport& report, bool compared) {
+  std::string names;
+  for (const Tier tier : kTiers)
+    if (report.compared(tier) == compared) names += fmt::format("{}{}", names.empty() ? "" : ", ", to_string(tier));
+  return names;
+}
+
 std::string conclusion(const PerformanceReport& report) {
+  const std::string unmeasured = tiers(report, false);
+  const std::string rest = unmeasured.empty() ? "" : fmt::format("; not compared: {}", unmeasured);
   if (const std::size_t regressions = report.count(GateResult::regression); regressions > 0)
-    return fmt::format("{} performance regressions proven", regressions);
-  if (report.exit() == ExitCode::nothing_ran) return "nothing could be compared";
-  return "no performance regression proven";
+    return fmt::format("{} performance regression{} proven{}", regressions, regressions == 1 ? "" : "s", rest);
+  if (tiers(report, true).empty()) return "nothing could be compared";
+  if (!report.missing.empty()) return fmt::format("not compared as required{}", rest);
+  return fmt::format("no performance regression proven by {}{}", tiers(report, true), rest);
+}
+
+/// One line for each sentence of `missing`.
+std::vector<std::string> missing(const PerformanceReport& report) {
+  std::vector<std::string> lines;
+  lines.reserve(report.missing.size());
+  for (const std::string& sentence : report.missing) lines.push_back("missing: " + sentence);
+  return lines;
 }
 
 /// What to do about counts that differ from a baseline's.
@@ -122,6 +140,7 @@ std::string performance_text(const PerformanceReport& report) {
   for (const std::string& line : totals(report)) text += line + "\n";
   for (const std::string& note : report.notes) text += note + "\n";
   for (const std::string& line : left_out(report)) text += line + "\n";
+  for (const std::string& line : missing(report)) text += line + "\n";
   if (const std::string line = remedy(report); !line.empty()) text += line + "\n";
   return text + conclusion(report) + "\n";
 }
@@ -132,6 +151,7 @@ std::string performance_markdown(const PerformanceReport& report) {
   for (const std::string& line : totals(report)) text += fmt::format("- {}\n", line);
   for (const std::string& note : report.notes) text += fmt::format("- {}\n", note);
   for (const std::string& line : left_out(report)) text += fmt::format("- {}\n", line);
+  for (const std::string& line : missing(report)) text += fmt::format("- {}\n", line);
   if (const std::string line = remedy(report); !line.empty()) text += fmt::format("- {}\n", line);
   const auto table = [&](const std::vector<const GateRow*>& rows) {
     std::string result;
@@ -164,8 +184,12 @@ std::string performance_junit(const PerformanceReport& report) {
     cases +=
         fmt::format(">\n      <{0} message=\"{1}\"/>\n    </testcase>\n", failed ? "failure" : "skipped", xml(sentence(row)));
   }
-  const std::string counts =
-      fmt::format("tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\"", report.rows.size(), failures, skipped);
+  for (const std::string& sentence : report.missing)
+    cases += fmt::format(
+        "    <testcase classname=\"required\" name=\"{0}\">\n      <error message=\"missing: {1}\"/>\n    </testcase>\n",
+        xml(sentence.substr(0, sentence.find(':'))), xml(sentence));
+  const std::string counts = fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\"",
+                                         report.rows.size() + report.missing.size(), failures, report.missing.size(), skipped);
   return fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites {0}>\n  <testsuite name=\"{1}\" {0}>\n{2}  "
       "</testsuite>\n</testsuites>\n",

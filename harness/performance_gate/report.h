@@ -13,7 +13,7 @@ std::string performance_text(const PerformanceReport& report);
 std::string performance_markdown(const PerformanceReport& report);
 
 /// One test case per cell, tier and metric: regressions are failures; what was changed, undecided, advisory or not compared is
-/// skipped with its reason.
+/// skipped with its reason.  What is missing is an error.
 std::string performance_junit(const PerformanceReport& report);
 
 }  // namespace nullmark
