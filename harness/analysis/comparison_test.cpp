@@ -67,6 +67,23 @@ TEST(Cost, ASampleVarianceIsAsUncertainAsItsKurtosisSays) {
   EXPECT_FALSE(cost_of(record)->analytic);
 }
 
+TEST(Cost, AVarianceThatRareSamplesDecideIsUncertain) {
+  CellRecord record = cell("delta");
+  ChannelRecord& channel = record.channel[0];
+  channel.variance_theory.reset();
+  channel.variance = 3.5e-20;
+  channel.bias = -1e-9;  // all samples were 0
+  channel.reference = channel.reference_rms = 1e-9;
+  EXPECT_TRUE(variance_is_uncertain(record, channel));
+  EXPECT_GT(cost_of(record)->variance.high / cost_of(record)->variance.value, 40);
+  channel.bias = 1e-11;
+  EXPECT_FALSE(variance_is_uncertain(record, channel));
+  channel.kurtosis = 99;
+  EXPECT_TRUE(variance_is_uncertain(record, channel));
+  channel.variance_theory = 1e-9;
+  EXPECT_FALSE(variance_is_uncertain(record, channel));
+}
+
 TEST(Cost, FloorsAreForThoseThatDoNotClaimToBeUnbiased) {
   const Cost cost = *cost_of(marching(0.002));
   EXPECT_NEAR(cost.floor->value, 0.002, 1e-12);
