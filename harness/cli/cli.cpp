@@ -12,9 +12,11 @@
 
 #include "harness/analysis/hard_case_table.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/process.h"
 #include "harness/config/schema.h"
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
+#include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
 #include "harness/registry/estimator_entry.h"
@@ -47,7 +49,7 @@ void deliver(const std::string& text, const std::string& output) {
 }
 
 ExitCode report(ExitCode code, const std::string& message) {
-  fmt::print(stderr, "nullmark: {}\n", one_line(message));
+  notice("nullmark: {}\n", one_line(message));
   return code;
 }
 
@@ -59,7 +61,7 @@ std::vector<RunRecord> load_all(const std::vector<std::string>& files) {
 }
 
 void warn(const std::string& file, const std::optional<std::string>& remark) {
-  if (remark) fmt::print(stderr, "nullmark: warning: {}: {}\n", file, one_line(*remark));
+  if (remark) notice("nullmark: warning: {}: {}\n", file, one_line(*remark));
 }
 
 /// Throws InputError where the word is none of the names.
@@ -368,6 +370,7 @@ ExitCode guarded(int argc, char** argv) {
 }  // namespace
 
 int nullmark_main(int argc, char** argv) {
+  open_closed_descriptors();
   ExitCode code = guarded(argc, argv);
   // A full disk or a closed pipe shows only here.
   if (std::fflush(stdout) != 0 && code == ExitCode::ok)

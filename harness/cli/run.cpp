@@ -20,6 +20,7 @@
 #include "harness/cli/signals.h"
 #include "harness/config/config.h"
 #include "harness/io/file_io.h"
+#include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
 #include "harness/io/spec_json.h"
@@ -49,7 +50,7 @@ std::optional<std::uint64_t> requested_seed(const std::string& text) {
   if (text == "random") {
     std::random_device device;
     const std::uint64_t seed = (std::uint64_t{device()} << 32) | device();
-    fmt::print(stderr, "nullmark: seed {}\n", seed);
+    notice("nullmark: seed {}\n", seed);
     return seed;
   }
   const auto seed = parsed<std::uint64_t>(text);
@@ -144,7 +145,7 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
       aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
       total_lookups * kNsPerLookup * 1e-9, kNsPerLookup, lookups_to_decide);
   if (any) return ExitCode::ok;
-  fmt::print(stderr, "nullmark: nothing would run: all cells are skipped\n");
+  notice("nullmark: nothing would run: all cells are skipped\n");
   return ExitCode::nothing_ran;
 }
 
@@ -206,15 +207,14 @@ ExitCode outcome(const std::vector<CellRecord>& cells) {
     any_ok |= cell.status == Status::ok;
   }
   if (any_ok) return ExitCode::ok;
-  fmt::print(stderr, "nullmark: nothing ran: all cells were skipped or not started\n");
+  notice("nullmark: nothing ran: all cells were skipped or not started\n");
   return ExitCode::nothing_ran;
 }
 
 void warn_of_own_seeds(const Plan& plan, std::uint64_t seed) {
   const auto own = std::find_if(plan.cells.begin(), plan.cells.end(), [&](const Cell& cell) { return cell.seed != seed; });
   if (own != plan.cells.end())
-    fmt::print(stderr, "nullmark: warning: experiment \"{}\" names its seeds itself; --seed does not change them\n",
-               own->experiment);
+    notice("nullmark: warning: experiment \"{}\" names its seeds itself; --seed does not change them\n", own->experiment);
 }
 
 /// Throws InputError where the output may not be written, or is there and neither to be completed nor replaced.
@@ -280,8 +280,8 @@ RunObserver observer_of(Journal* journal, Progress& progress, RunContext& contex
 
 void tell_results(const RunRecord& run, const std::string& output) {
   fmt::print("{}", results_tables(run));
-  fmt::print(stderr, "results: {}\n", output);
-  if (const auto remark = busy_remark(run)) fmt::print(stderr, "nullmark: warning: {}\n", *remark);
+  notice("results: {}\n", output);
+  if (const auto remark = busy_remark(run)) notice("nullmark: warning: {}\n", *remark);
 }
 
 }  // namespace
@@ -293,8 +293,7 @@ ExitCode run_command(const RunCommand& command) {
   const std::vector<bool> wanted = filtered(plan, command), selected = of_shard(wanted, command);
   const auto count = static_cast<std::size_t>(std::count(selected.begin(), selected.end(), true));
   if (count == 0) {
-    fmt::print(stderr, "nullmark: nothing selected: none of {} cells passes --filter, --covering and --shard\n",
-               plan.cells.size());
+    notice("nullmark: nothing selected: none of {} cells passes --filter, --covering and --shard\n", plan.cells.size());
     return ExitCode::nothing_ran;
   }
   if (seed) warn_of_own_seeds(plan, *seed);

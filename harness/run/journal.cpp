@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "harness/io/file_io.h"
+#include "harness/io/notice.h"
 #include "harness/io/results_json.h"
 #include "harness/io/spec_json.h"
 
@@ -74,32 +75,45 @@ void Journal::read(const std::string& config_hash, Mode mode) {
   int number = 0;
   for (std::size_t begin = 0; begin < complete;) {
     const std::size_t end = text.find('\n', begin);
-    const std::string line = text.substr(begin, end - begin);
-    const std::string where = fmt::format("{}:{}", path_, ++number);
+    const std::string line = text.substr(begin, end - begin), where = fmt::format("{}:{}", path_, ++number);
     begin = end + 1;
-    const Json json = parse_json(line, where);
-    const JsonNode node(json, where);
-    if (number > 1) {
-      CellRecord record = read_cell(node);
-      const auto same = [&](const CellRecord& other) {
-        return other.cell.id == record.cell.id && other.cell.name == record.cell.name;
-      };
-      cells_.erase(std::remove_if(cells_.begin(), cells_.end(), same), cells_.end());
-      cells_.push_back(std::move(record));
-      continue;
-    }
-    node.expect_object();
-    if (node["nullmark_journal"].integer(0, 1'000'000) != kJournalSchema)
-      node["nullmark_journal"].expected(fmt::format("{}, the journal this program writes", kJournalSchema));
-    if (const JsonNode version = node[kVersionKey]; version.string() != RunRecord::kVersion)
-      version.expected(fmt::format("\"{}\", which this program writes", RunRecord::kVersion));
-    if (node["config_hash"].string() != config_hash)
-      node["config_hash"].expected(
-          fmt::format("\"{}\": the journal is of another configuration or seed; --force starts again", config_hash));
+    if (number == 1)
+      read_header(line, config_hash);
+    else
+      read_line(line, where);
   }
   holds_cells_ = !cells_.empty();
   if (complete < text.size() && ::ftruncate(file_, static_cast<off_t>(complete)) != 0)
     throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
+}
+
+void Journal::read_header(const std::string& line, const std::string& config_hash) {
+  const std::string where = path_ + ":1";
+  const Json json = parse_json(line, where);
+  const JsonNode node(json, where);
+  node.expect_object();
+  if (node["nullmark_journal"].integer(0, 1'000'000) != kJournalSchema)
+    node["nullmark_journal"].expected(fmt::format("{}, the journal this program writes", kJournalSchema));
+  if (const JsonNode version = node[kVersionKey]; version.string() != RunRecord::kVersion)
+    version.expected(fmt::format("\"{}\", which this program writes", RunRecord::kVersion));
+  if (node["config_hash"].string() != config_hash)
+    node["config_hash"].expected(
+        fmt::format("\"{}\": the journal is of another configuration or seed; --force starts again", config_hash));
+}
+
+void Journal::read_line(const std::string& line, const std::string& where) {
+  try {
+    const Json json = parse_json(line, where);
+    CellRecord record = read_cell(JsonNode(json, where));
+    const auto same = [&](const CellRecord& other) {
+      return other.cell.id == record.cell.id && other.cell.name == record.cell.name;
+    };
+    cells_.erase(std::remove_if(cells_.begin(), cells_.end(), same), cells_.end());
+    cells_.push_back(std::move(record));
+  } catch (const InputError& error) {
+    // What another program wrote there costs the cell of that line, not the others.
+    notice("nullmark: warning: {}; the line is skipped\n", error.what());
+  }
 }
 
 void Journal::write_header(const std::string& config_hash) {

@@ -18,8 +18,8 @@ class Journal {
     overwrite  ///< discards an existing journal
   };
 
-  /// Throws InputError if another run holds the lock, if the journal belongs to another configuration, or if it is damaged before
-  /// its last line.  A damaged last line, which a kill can leave, is dropped.
+  /// Throws InputError if another run holds the lock, or if the journal belongs to another configuration.  A damaged last line,
+  /// which a kill can leave, is dropped; any other line that is no cell is skipped with a warning.
   Journal(const std::string& results_path, const std::string& config_hash, Mode mode);
   /// Keeps the file for a later resume if it holds cells, removes it otherwise.
   ~Journal();
@@ -39,6 +39,8 @@ class Journal {
  private:
   void lock();
   void read(const std::string& config_hash, Mode mode);
+  void read_header(const std::string& line, const std::string& config_hash);
+  void read_line(const std::string& line, const std::string& where);
   void write_header(const std::string& config_hash);
 
   std::string path_;
