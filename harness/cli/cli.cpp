@@ -371,6 +371,8 @@ ExitCode guarded(int argc, char** argv) {
 
 int nullmark_main(int argc, char** argv) {
   open_closed_descriptors();
+  report_files_that_grow_too_large();
+  tell_of_crashes();
   ExitCode code = guarded(argc, argv);
   // A full disk or a closed pipe shows only here.
   if (std::fflush(stdout) != 0 && code == ExitCode::ok)

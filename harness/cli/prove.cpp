@@ -4,6 +4,7 @@
 
 #include "harness/analysis/check.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/process.h"
 #include "harness/cli/signals.h"
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
@@ -74,6 +75,7 @@ ExitCode prove_medium_alone(const ProveCommand& command, std::string& text) {
 
 ExitCode prove_command(const ProveCommand& command) {
   refuse_overwriting({}, {command.output});
+  expect_threads(command.threads);
   std::string text;
   ExitCode medium_exit = ExitCode::ok;
   if (!command.medium.empty()) {

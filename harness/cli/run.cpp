@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "harness/cli/commands.h"
+#include "harness/cli/process.h"
 #include "harness/cli/signals.h"
 #include "harness/config/config.h"
 #include "harness/io/file_io.h"
@@ -75,6 +76,10 @@ Shard requested_shard(const std::string& text) {
 
 /// The cells of a plan that `--filter` and `--covering` pick.
 std::vector<bool> filtered(const Plan& plan, const RunCommand& command) {
+  // Beyond that std::regex runs out of stack.
+  constexpr std::size_t kLongest = 1000;
+  if (command.filter.size() > kLongest)
+    throw InputError(fmt::format("--filter: found {} characters; expected at most {}", command.filter.size(), kLongest));
   std::regex pattern;
   try {
     pattern = std::regex(command.filter);
@@ -297,6 +302,7 @@ ExitCode run_command(const RunCommand& command) {
     return ExitCode::nothing_ran;
   }
   if (seed) warn_of_own_seeds(plan, *seed);
+  expect_threads(command.threads);
   if (command.dry_run) return dry_run(plan, selected);
 
   const bool to_stdout = command.output == "-";

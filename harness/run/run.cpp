@@ -16,9 +16,12 @@
 #include <mutex>
 #include <thread>
 
+#include "harness/io/json_input.h"
+#include "harness/model/in_flight.h"
 #include "harness/run/cell_images.h"
 #include "harness/run/cell_record.h"
 #include "harness/run/task_thread.h"
+#include "harness/sampling/failure.h"
 #include "harness/sampling/test_families.h"
 #include "harness/sampling/timing.h"
 #include "harness/verdict/judge.h"
@@ -40,7 +43,7 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
   CellOutcome outcome{blank_record(plan, prepared), {}};
   CellRecord& record = outcome.record;
   if (!prepared.reason.empty()) {
-    record.status = Status::skipped;
+    record.status = prepared.failure.empty() ? Status::skipped : Status::error;
     record.reason = prepared.reason;
     return outcome;
   }
@@ -84,6 +87,20 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     drop_sampled_statistics(record);
   }
   write_images(record, prepared, *sampled, options, observer);
+  return outcome;
+}
+
+/// The same; what a tracker throws makes an error of its cell alone.
+CellOutcome run_or_fail(const Plan& plan, PreparedCell& prepared, const Families& families, const std::function<bool()>& late,
+                        const RunOptions& options, const RunObserver& observer, const std::function<bool()>& given_up) {
+  const InFlight named(prepared.cell->name);
+  CellOutcome outcome;
+  const std::string failure = failure_of<InputError, ParameterError, std::bad_alloc>(
+      [&] { outcome = run_cell(plan, prepared, families, late, options, observer, given_up); });
+  if (failure.empty()) return outcome;
+  outcome = {blank_record(plan, prepared), {}};
+  outcome.record.status = Status::error;
+  outcome.record.reason = failure;
   return outcome;
 }
 
@@ -131,7 +148,7 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
     if (const std::unique_lock lock(telling, std::try_to_lock); lock) observer.progress(record, fraction);
   };
   for_each_in_order(cells.size(), threads, failed, [&](std::size_t i) {
-    outcomes[i] = run_cell(plan, cells[i], families, late, options, guarded, given_up);
+    outcomes[i] = run_or_fail(plan, cells[i], families, late, options, guarded, given_up);
     teller.add([&, i] {
       const std::lock_guard lock(telling);
       observer.cell_done(outcomes[i].record, ++done, cells.size());

@@ -7,9 +7,11 @@
 #include <cmath>
 
 #include "harness/kernel/path_kernel.h"
+#include "harness/model/in_flight.h"
 #include "harness/model/names.h"
 #include "harness/registry/components.h"
 #include "harness/sampling/build_transport.h"
+#include "harness/sampling/failure.h"
 #include "harness/sampling/ray_memory.h"
 
 namespace nullmark {
@@ -30,6 +32,12 @@ constexpr Real kDeepestSingle = 1 << 14;
 /// Of a medium from its frame's origin, in its own sizes: its inside is still told to 2^-14.
 constexpr Real kFarthestSingle = 1 << 10, kFarthestDouble = 0x1p39;
 
+/// What a tracker throws is its cell's failure; a mistake in the configuration and a lack of memory are not.
+template <class F>
+std::string tracker_failure(F&& f) {
+  return failure_of<ParameterError, MissingData, std::bad_alloc>(f);
+}
+
 template <class Key, class Value, class Make>
 std::shared_ptr<const Value> once(std::map<Key, std::shared_ptr<const Value>>& cache, const Key& key, Make&& make) {
   std::shared_ptr<const Value>& entry = cache[key];
@@ -45,6 +53,7 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
   prepared.cell = &cell;
   prepared.index = index;
   prepared.samples_per_ray = cell.samples_per_ray;
+  const InFlight named(cell.name);
   const MediumSpec& spec = plan_.media[cell.medium];
   if (const auto missing = missing_.find(cell.medium); missing != missing_.end()) {
     prepared.reason = missing->second;
@@ -59,6 +68,14 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
     prepared.reason = missing_[cell.medium] = error.what();
     return prepared;
   }
+  prepared.failure = tracker_failure([&] { add_kernel(prepared); });
+  if (!prepared.failure.empty()) prepared.reason = prepared.failure;
+  return prepared;
+}
+
+/// The tracker of a cell whose scene is built.
+void CellPreparer::add_kernel(PreparedCell& prepared) {
+  const Cell& cell = *prepared.cell;
   const auto source = located(cell.estimator.pointer, [&] { return make_estimator(cell.estimator); });
   located(cell.estimator.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
   prepared.claim = source->claim(cell.quantity);
@@ -72,7 +89,6 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
   }
   if (prepared.reason.empty())
     prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity, cell.reference);
-  return prepared;
 }
 
 /// The kernel of a radiance, composed from the scene's effects.
@@ -194,9 +210,16 @@ void add_theory(std::vector<PreparedCell>& cells) {
     auto& [scene, members] = entry;
     std::vector<TheoryQuery> queries;
     for (const PreparedCell* member : members)
-      queries.push_back({member->kernel.get(), member->cell->quantity, member->range, &member->targets});
-    const std::vector<CellTheory> theory = compute_theory(*scene, queries);
-    for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
+      queries.push_back(
+          {member->kernel.get(), member->cell->quantity, member->range, &member->targets, &member->cell->name});
+    const std::string failure = tracker_failure([&] {
+      const std::vector<CellTheory> theory = compute_theory(*scene, queries);
+      for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
+    });
+    // One of them threw: each by itself shows which.
+    for (std::size_t i = 0; i < members.size() && !failure.empty(); ++i)
+      members[i]->reason = members[i]->failure =
+          tracker_failure([&] { members[i]->theory = compute_theory(*scene, {queries[i]})[0]; });
   });
   for (PreparedCell& prepared : cells) {
     if (!prepared.cell->equal_lookups || !prepared.reason.empty()) continue;

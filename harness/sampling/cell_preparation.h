@@ -11,13 +11,13 @@
 
 namespace nullmark {
 
-/// A cell and everything needed to sample it; `reason` is set if it cannot run.
+/// A cell and everything needed to sample it; `reason` is set if it cannot run, `failure` if its tracker threw.
 struct PreparedCell {
   const Cell* cell = nullptr;
   std::size_t index = 0;
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const Kernel> kernel;
-  std::string reason;
+  std::string reason, failure;
   std::vector<std::string> effects;  ///< of a radiance kernel
   bool takes_part = true;            ///< false: flights are closed forms, and the estimator is not used
   Targets targets;
@@ -40,10 +40,11 @@ class CellPreparer {
   explicit CellPreparer(const Plan& plan) : plan_(plan) {}
 
   /// Prepares a cell by its index in the plan, without its theory.  Throws ParameterError (with a JSON pointer as `parameter`)
-  /// for specifications that do not fit their medium.
+  /// for specifications that do not fit their medium.  What else a tracker throws is the cell's `failure`.
   PreparedCell prepare(std::size_t index);
 
  private:
+  void add_kernel(PreparedCell& prepared);
   void add_light(PreparedCell& prepared, const EstimatorSource& source) const;
   std::string why_not(const Cell& cell, const Scene& scene, const Kernel* made);
   Real deepest_majorant(const Scene& scene);
@@ -65,7 +66,7 @@ class CellPreparer {
 std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted);
 
 /// Adds theory to all cells that can run, scene by scene.  Cells with a measurement get none, because it changes the law of the
-/// samples.  With equal_lookups, the number of samples follows from the theory.
+/// samples.  With equal_lookups, the number of samples follows from the theory.  A cell whose tracker throws has a `failure`.
 void add_theory(std::vector<PreparedCell>& cells);
 
 }  // namespace nullmark

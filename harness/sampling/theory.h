@@ -28,6 +28,7 @@ struct TheoryQuery {
   Quantity quantity = Quantity::transmittance;
   SampleRange range = SampleRange::any_sign;
   const Targets* targets = nullptr;
+  const std::string* name = nullptr;  ///< of the cell, for messages; must outlive the computation
 };
 std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<TheoryQuery>& queries);
 
