@@ -1,18 +1,13 @@
 #include "harness/io/notice.h"
 
-#include <unistd.h>
-
-#include <cerrno>
+#include <cstdio>
 
 namespace nullmark {
 
 void write_notice(std::string_view text) noexcept {
-  while (!text.empty()) {
-    const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
+  // Unbuffered: a line is one write, and what could not be written leaves nothing behind.
+  (void)std::fwrite(text.data(), 1, text.size(), stderr);
+  std::clearerr(stderr);
 }
 
 }  // namespace nullmark
