@@ -5,6 +5,7 @@
 #include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
+#include "harness/model/program_name.h"
 #include "harness/report/comparison_text.h"
 #include "harness/report/data.h"
 #include "harness/report/figures.h"
@@ -18,7 +19,7 @@ ExitCode report_command(const ReportCommand& command) {
   if (!command.figures.empty()) expect_figures_possible(command.figures);
   std::vector<RunRecord> runs;
   for (const std::string& file : command.results) runs.push_back(read_results(read_file(file), file));
-  std::string words = "nullmark report";
+  std::string words = program_name() + " report";
   for (const std::string& file : command.results) words += " " + file;
   const ReportData data = report_data(runs, command.results, command.baseline, words + " -o " + command.output);
   for (const std::string& warning : data.warnings) notice("nullmark: warning: {}\n", warning);

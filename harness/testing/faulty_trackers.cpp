@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "estimators/ratio.h"
+#include "harness/registry/plugin.h"
 #include "harness/registry/register_estimator.h"
 
 namespace nullmark {
@@ -76,6 +77,7 @@ struct FaultyTracker : RatioTracking<Value> {
   }
 };
 
+NULLMARK_PLUGIN("faulty", "7");
 NULLMARK_REGISTER_ESTIMATOR(FaultyTracker);
 
 }  // namespace nullmark
