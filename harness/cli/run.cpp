@@ -1,5 +1,3 @@
-#include "harness/run/run.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,6 +17,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/process.h"
 #include "harness/cli/signals.h"
+#include "harness/cli/watched_run.h"
 #include "harness/config/config.h"
 #include "harness/io/file_io.h"
 #include "harness/io/notice.h"
@@ -34,6 +33,7 @@
 #include "harness/run/predict.h"
 #include "harness/run/progress.h"
 #include "harness/run/provenance.h"
+#include "harness/run/resume.h"
 
 namespace nullmark {
 namespace {
@@ -154,37 +154,6 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
   return ExitCode::nothing_ran;
 }
 
-/// What earlier runs of the same configuration left, by place in the plan.
-using Earlier = std::map<std::size_t, CellRecord>;
-
-void keep(const Plan& plan, std::vector<CellRecord> records, Earlier& earlier) {
-  std::map<std::pair<std::string, std::string>, std::size_t> places;
-  for (std::size_t i = 0; i < plan.cells.size(); ++i) places[{plan.cells[i].id, plan.cells[i].name}] = i;
-  for (CellRecord& record : records)
-    if (const auto at = places.find({record.cell.id, record.cell.name}); at != places.end())
-      earlier[at->second] = std::move(record);
-}
-
-/// The record of a cell under the plan's own name for it: cells of different experiments may share statistics.
-CellRecord placed(CellRecord record, const Cell& cell) {
-  const std::uint64_t samples = record.cell.samples_per_ray;
-  record.cell = cell;
-  if (cell.equal_lookups) record.cell.samples_per_ray = samples;
-  return record;
-}
-
-Earlier earlier_results(const Plan& plan, const std::string& output, const Journal& journal) {
-  Earlier earlier;
-  if (std::filesystem::exists(output)) {
-    RunRecord before = read_results(read_file(output), output);
-    if (before.config_text != plan.config_text)
-      throw InputError(output + ": holds results of another configuration or seed; --force replaces them");
-    keep(plan, std::move(before.cells), earlier);
-  }
-  keep(plan, journal.cells(), earlier);
-  return earlier;
-}
-
 /// Files that the run reads: configurations and the volumes of its media.
 std::vector<std::string> inputs_of(const std::vector<ConfigSource>& sources, const Plan& plan) {
   std::vector<std::string> files;
@@ -231,7 +200,8 @@ std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vect
   auto journal = std::make_unique<Journal>(output, config_hash(plan.config_text),
                                            command.resume  ? Mode::resume
                                            : command.force ? Mode::overwrite
-                                                           : Mode::fresh);
+                                                           : Mode::fresh,
+                                           this_build(), builds_of(command.builds));
   if (!command.resume && !command.force && std::filesystem::exists(output))
     throw InputError(output + ": exists; --resume completes it, --force replaces it");
   return journal;
@@ -289,6 +259,25 @@ void tell_results(const RunRecord& run, const std::string& output) {
   if (const auto remark = busy_remark(run)) notice("nullmark: warning: {}\n", *remark);
 }
 
+/// To the file, whose journal is done with then, or to standard output where there is no journal.
+ExitCode write_results(const Plan& plan, Earlier cells, const RunContext& context, const std::string& output, Journal* journal) {
+  RunRecord run;
+  run.name = plan.name;
+  run.config_text = plan.config_text;
+  run.provenance = make_provenance(context, std::chrono::system_clock::now());
+  run.tables = plan.tables;
+  run.claims = plan.claims;
+  for (auto& [place, record] : cells) run.cells.push_back(std::move(record));
+  if (journal) {
+    write_atomically(output, results_text(run));
+    journal->remove();
+    tell_results(run, output);
+  } else {
+    fmt::print("{}", results_text(run));
+  }
+  return outcome(run.cells);
+}
+
 }  // namespace
 
 ExitCode run_command(const RunCommand& command) {
@@ -311,7 +300,7 @@ ExitCode run_command(const RunCommand& command) {
   Earlier earlier;
   if (!to_stdout) {
     journal = open_journal(command, sources, plan, output);
-    if (command.resume) earlier = earlier_results(plan, output, *journal);
+    if (command.resume) earlier = earlier_results(plan, output, *journal, builds_of(command.builds));
   }
   RunContext context = context_of(command, plan);
   const RunOptions options = options_of(command, to_stdout ? "" : output);
@@ -324,28 +313,14 @@ ExitCode run_command(const RunCommand& command) {
     if (selected[place] && record.status == Status::ok) finished.push_back(placed(record, plan.cells[place]));
 
   catch_signals();
-  RunRecord run;
-  {
-    Progress progress(count - finished.size());
-    std::vector<CellRecord> records = run_plan(plan, selected, finished, options, observer_of(journal.get(), progress, context));
+  std::optional<Progress> progress(count - finished.size());
+  const auto conclude = [&](std::vector<CellRecord> records) {
+    progress.reset();
     for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i)
       if (selected[i] && next < records.size()) earlier[i] = placed(std::move(records[next++]), plan.cells[i]);
-  }
-
-  run.name = plan.name;
-  run.config_text = plan.config_text;
-  run.provenance = make_provenance(context, std::chrono::system_clock::now());
-  run.tables = plan.tables;
-  run.claims = plan.claims;
-  for (auto& [place, record] : earlier) run.cells.push_back(std::move(record));
-  if (to_stdout) {
-    fmt::print("{}", results_text(run));
-  } else {
-    write_atomically(output, results_text(run));
-    journal->remove();
-    tell_results(run, output);
-  }
-  return outcome(run.cells);
+    return write_results(plan, std::move(earlier), context, output, journal.get());
+  };
+  return watched_run(plan, selected, finished, options, observer_of(journal.get(), *progress, context), conclude);
 }
 
 }  // namespace nullmark

@@ -102,6 +102,7 @@ void state_lookups(CellTheory& cell, const RayTheories& theories, std::size_t k)
     all_lookups = all_lookups && finite(theory.lookups);
     heavy = heavy || (theory.lookups_variance && *theory.lookups_variance == kInfinity);
     all_spreads = all_spreads && finite(theory.lookups_variance);
+    cell.most_lookups = std::max(cell.most_lookups, theory.lookups.value_or(0));
     lookups += cell.ray_lookups[ray] = theory.lookups.value_or(0);
     cell.ray_lookups_variance[ray] = theory.lookups_variance.value_or(0);
   }
