@@ -70,8 +70,9 @@ struct Control {
     return linear ? Distance(first + growth * s) : Distance(first * exponential(growth * s));
   }
 
-  /// tau_c from the ray's begin to a distance t on it, in closed form.
+  /// tau_c from the ray's begin to a distance t on it, in closed form; 0 on a ray that misses the medium.
   Value depth_to(Real t) const {
+    if (!(length > 0)) return uniform_value<Value>(channels, 0);
     const Real s = (t - begin) / length;
     if (linear) return uniform_value<Value>(channels, length * s * (first + growth * s / 2));
     if (exponential_profile)

@@ -37,7 +37,10 @@ struct ResidualRatioTracking {
       throw ParameterError("value", "an exponential control needs value and value_end above zero");
   }
 
-  Guarantee claim(Quantity) const { return Guarantee::unbiased; }
+  /// A profile of one component is the product of that component's walk with the control: no quantity.
+  Guarantee claim(Quantity quantity) const {
+    return quantity == Quantity::transmittance_profile && component != "product" ? Guarantee::biased : Guarantee::unbiased;
+  }
 
   SampleRange range() const { return choice.rate_scale < 1 ? SampleRange::any_sign : kRange; }
 

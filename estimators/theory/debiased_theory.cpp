@@ -82,6 +82,7 @@ class SymmetricMoments {
 
 }  // namespace
 
+// One derivation, read from top to bottom.
 std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Real steps, bool endpoint_matching) {
   if (has_constant_extinction(profile, c)) return 0;
   const Real tau = profile.optical_depth(c), scale = std::exp(-2 * tau);

@@ -27,6 +27,7 @@ RayProfile refined(const Rates& majorant, const RayProfile& profile, Real least)
 
 }  // namespace
 
+// One derivation, read from top to bottom: its parts share every array.
 Theory guided_moments(const Rates& majorant, const RayProfile& profile, int c, Real least, bool start_looked_up) {
   constexpr Real kDeepest = 40;
   const Real total = majorant.total_depth();

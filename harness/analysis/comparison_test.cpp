@@ -67,6 +67,23 @@ TEST(Cost, ASampleVarianceIsAsUncertainAsItsKurtosisSays) {
   EXPECT_FALSE(cost_of(record)->analytic);
 }
 
+TEST(Cost, AVarianceThatRareSamplesDecideIsUncertain) {
+  CellRecord record = cell("delta");
+  ChannelRecord& channel = record.channel[0];
+  channel.variance_theory.reset();
+  channel.variance = 3.5e-20;
+  channel.bias = -1e-9;  // all samples were 0
+  channel.reference = channel.reference_rms = 1e-9;
+  EXPECT_TRUE(variance_is_uncertain(record, channel));
+  EXPECT_GT(cost_of(record)->variance.high / cost_of(record)->variance.value, 40);
+  channel.bias = 1e-11;
+  EXPECT_FALSE(variance_is_uncertain(record, channel));
+  channel.kurtosis = 99;
+  EXPECT_TRUE(variance_is_uncertain(record, channel));
+  channel.variance_theory = 1e-9;
+  EXPECT_FALSE(variance_is_uncertain(record, channel));
+}
+
 TEST(Cost, FloorsAreForThoseThatDoNotClaimToBeUnbiased) {
   const Cost cost = *cost_of(marching(0.002));
   EXPECT_NEAR(cost.floor->value, 0.002, 1e-12);
@@ -268,6 +285,50 @@ TEST(Compare, TablesTellTiesFloorsAndBreakEven) {
   EXPECT_EQ(text.find("same streams"), std::string::npos) << text;
   EXPECT_NE(compare_markdown(runs, "", false).find("| 2= | ratio |"), std::string::npos) << compare_markdown(runs, "", false);
   EXPECT_TRUE(compare_text({}, "", false).empty());
+}
+
+/// A tracker that claims to be unbiased, is twice as fast, and whose verdict says otherwise; its floor is that of `floor`.
+CellRecord disproven(const char* name, Outcome outcome, Real floor) {
+  CellRecord record = cell(name, 0.04, 5);
+  record.channel[0].rmse = std::sqrt(floor * floor * 0.25 + 0.04 / 100);
+  record.verdict.emplace();
+  record.verdict->against = "reference";
+  record.verdict->unbiased = outcome;
+  record.verdict->violated = outcome == Outcome::violated;
+  return record;
+}
+
+TEST(Compare, ATrackerWhoseVerdictIsFailIsNeverTheBaseline) {
+  for (const Outcome outcome : {Outcome::fail, Outcome::violated}) {
+    const CellRecord wrong = disproven("wrong", outcome, 0.5);
+    const Comparison comparison = only_comparison({wrong, cell("ratio")});
+    ASSERT_TRUE(comparison.baseline && comparison.best_unbiased);
+    EXPECT_EQ(comparison.cells[*comparison.baseline].label, "ratio");
+    EXPECT_EQ(comparison.cells[*comparison.best_unbiased].label, "ratio");
+    const auto& ranked = comparison.cells[comparison.cells[0].label == "wrong" ? 0 : 1];
+    ASSERT_TRUE(ranked.cost->floor);
+    EXPECT_NEAR(ranked.cost->floor->value, 0.5, 1e-9);
+    std::vector<RunRecord> runs(1);
+    runs[0].cells = {wrong, cell("ratio")};
+    EXPECT_NE(compare_text(runs, "", false).find(outcome == Outcome::fail ? "FAIL" : "VIOLATED"), std::string::npos);
+    EXPECT_NE(compare_markdown(runs, "", false).find("not tested (claims unbiased)"), std::string::npos);
+  }
+  const CellRecord right = disproven("right", Outcome::pass, 0);
+  EXPECT_EQ(only_comparison({right, cell("ratio")}).cells[0].label, "right");
+  EXPECT_EQ(*only_comparison({right, cell("ratio")}).baseline, 0u);
+}
+
+TEST(Compare, CellsWithTheSameSamplesAndWalksInLanesAreRemarkedOn) {
+  std::vector<RunRecord> runs(1);
+  runs[0].cells = {cell("ratio"), cell("residual_ratio"), cell("other")};
+  for (CellRecord& record : runs[0].cells) record.draws = 700;
+  runs[0].cells[2].channel[0].mean = 0.4;
+  runs[0].cells[0].in_lanes = true;
+  const std::string text = compare_text(runs, "", false);
+  EXPECT_NE(text.find("the same samples to the last bit: ratio, residual_ratio\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("side by side in registers: ratio; the others"), std::string::npos) << text;
+  for (CellRecord& record : runs[0].cells) record.in_lanes = true;
+  EXPECT_EQ(compare_text(runs, "", false).find("side by side"), std::string::npos);
 }
 
 TEST(Compare, TheConfigurationsTablesComeWithIt) {

@@ -145,6 +145,7 @@ class BlockKernel : public Kernel {
   }
 
  private:
+  // The loop that trackers are timed in stays in one piece.
   template <bool recorded>
   void run_block(State& state, const Medium& medium, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
                  std::size_t count, Quantity quantity, Real* values, std::uint32_t* lookups, Counters& counters) const {

@@ -45,6 +45,15 @@ bool stands_unbiased(const CellRecord& record) {
          verdict.lawful != Outcome::fail;
 }
 
+bool variance_is_uncertain(const CellRecord& record, const ChannelRecord& channel) {
+  if (channel.variance_theory || !channel.variance || record.samples == 0) return false;
+  const auto samples = static_cast<Real>(record.samples);
+  if (channel.kurtosis && std::sqrt(std::max<Real>(0, *channel.kurtosis - 1) / samples) > 0.5) return true;
+  if (record.claims != "unbiased" || !stands_unbiased(record) || !channel.bias) return false;
+  const Real rounding = kRounding * channel.reference_rms.value_or(0) + channel.reference_error.value_or(0);
+  return std::abs(*channel.bias) > 5 * std::sqrt(*channel.variance / samples) + rounding;
+}
+
 std::optional<Cost> cost_of(const CellRecord& record) {
   if (record.status != Status::ok || record.channel.empty() || !record.outputs.empty()) return std::nullopt;
   Real variance = 0, mean_square_error = 0, reference = 0, relative_error = 0;
@@ -58,6 +67,8 @@ std::optional<Cost> cost_of(const CellRecord& record) {
     mean_square_error += square(channel.rmse.value_or(0));
     if (channel.variance_theory) continue;
     analytic = false;
+    // A factor of 50 either way.
+    if (variance_is_uncertain(record, channel)) relative_error = std::max<Real>(relative_error, 2);
     if (channel.kurtosis)
       relative_error = std::max(relative_error, std::sqrt(std::max<Real>(0, *channel.kurtosis - 1) /
                                                           static_cast<Real>(std::max<std::uint64_t>(1, record.samples))));

@@ -16,9 +16,9 @@ inline constexpr Real kRounding = 1e-10;
 /// Cost of accuracy in one cell, averaged over its channels.  n samples of a ray have the mean squared error V / n + (floor R)^2
 /// and take n times the time of one.  R is the root mean square of the reference.
 struct Cost {
-  bool analytic = false;                  ///< the variance comes from theory
-  Real reference = 0;                     ///< R
-  Interval variance;                      ///< V of one sample; the interval of a sample variance comes from its kurtosis
+  bool analytic = false;  ///< the variance comes from theory
+  Real reference = 0;     ///< R
+  Interval variance;      ///< V of one sample; the interval of a sample variance comes from its kurtosis, or is wide if uncertain
   std::optional<Interval> ns_per_sample;  ///< median over the repetitions
   /// Cost of a sample by the number that share a walk through the majorant structure, ascending; the last is ns_per_sample.
   std::vector<std::pair<std::uint64_t, Interval>> ns_by_batch;
@@ -30,6 +30,11 @@ struct Cost {
 /// Whether a cell counts as unbiased: its estimator claims it, its samples are used as drawn, and its verdict is neither FAIL nor
 /// VIOLATED.
 bool stands_unbiased(const CellRecord& record);
+
+/// Whether a sample variance without theory tells little: its own standard error is above a half, by the kurtosis; or the mean of
+/// an estimator that stands as unbiased lies farther than 5 standard errors from the reference, because rare samples were not
+/// seen.
+bool variance_is_uncertain(const CellRecord& record, const ChannelRecord& channel);
 
 /// Nothing if a channel's reference or variance is unknown, the reference is 0, or the cell has several outputs per channel.
 std::optional<Cost> cost_of(const CellRecord& record);

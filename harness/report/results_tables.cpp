@@ -72,7 +72,8 @@ Line channel_line(const CellRecord& record, std::size_t c) {
                 : "  " + output_name(record, c),
           shown(channel, channel.rmse, channel.rmse_theory),
           short_number(channel.bias),
-          shown(channel, unless_rounding(channel, channel.variance), unless_rounding(channel, channel.variance_theory)),
+          shown(channel, unless_rounding(channel, channel.variance), unless_rounding(channel, channel.variance_theory)) +
+              (variance_is_uncertain(record, channel) ? "?" : ""),
           short_number(unless_rounding(channel, channel.variance_theory)),
           once(record.lookups_per_sample),
           once(record.lookups_theory),
@@ -157,18 +158,22 @@ std::vector<Line> side_by_side(const Table& table, const CellsByName& cells) {
 
 std::string results_tables(const RunRecord& run) {
   std::string text;
-  bool marked = false;
+  bool marked = false, uncertain = false;
   for (const auto& [title, records] : grouped(run.cells, heading)) {
     std::vector<Line> lines = {{"estimator", "rmse", "bias", "variance", "variance theory", "lookups", "lookups theory",
                                 "ns/lookup", "floor ratio", "variance x ns", "verdict", "status"}};
     for (const CellRecord* record : records) {
       append_lines(*record, lines);
-      for (const ChannelRecord& channel : record->channel) marked |= heavy_tailed(channel) && channel.variance_theory;
+      for (const ChannelRecord& channel : record->channel) {
+        marked |= heavy_tailed(channel) && channel.variance_theory;
+        uncertain |= variance_is_uncertain(*record, channel);
+      }
     }
     text += title + "\n" + aligned(lines, 1) + "\n";
   }
   if (marked)
     text += fmt::format("* theory: the relative variance is above {}, too heavy a tail for the sample's own\n\n", kHeavyTail);
+  if (uncertain) text += "? too few samples to know this variance: rare samples decide it\n\n";
   for (const auto& [title, lines] : configured_tables(run)) text += fmt::format("{}\n{}\n", title, aligned(lines, 1));
   return text;
 }

@@ -196,11 +196,13 @@ class MediumContract {
 
 }  // namespace
 
+std::vector<ContractFinding> check_medium(const Medium& medium) { return MediumContract(medium).findings(); }
+
 std::vector<ContractFinding> check_medium(const Json& medium) {
   std::vector<ContractFinding> all;
   for (const MediumSpec& spec : read_media(JsonNode(medium, "prove"))) {
     const BuiltMedium built = build_medium(spec);
-    for (ContractFinding& finding : MediumContract(*built.medium).findings()) {
+    for (ContractFinding& finding : check_medium(*built.medium)) {
       finding.what = spec.label + ": " + finding.what;
       all.push_back(std::move(finding));
     }

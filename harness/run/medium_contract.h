@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "harness/io/json_input.h"
+#include "media/base/medium.h"
 
 namespace nullmark {
 
@@ -26,5 +27,6 @@ struct ContractFinding {
 /// `medium` is a name, or an object as in a configuration; of a sweep each member is tried.  Throws InputError, ParameterError
 /// and MissingData.
 std::vector<ContractFinding> check_medium(const Json& medium);
+std::vector<ContractFinding> check_medium(const Medium& medium);
 
 }  // namespace nullmark

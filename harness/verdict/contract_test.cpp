@@ -264,6 +264,20 @@ TEST(Contract, RaysThatMissOrAreEmptyHaveTransmittanceOneWithoutLookups) {
   }
 }
 
+/// Rays of one image hit and miss; a profile is asked for on all of them.
+TEST(Contract, ProfilesBearRaysThatMiss) {
+  const auto records = run(fmt::format(
+      R"("rays":{{"type":"perspective","width":4,"height":4,"view":[-1,-0.4,-0.3],"up":[0,0,1],"distance":2,"field_of_view":60}},
+          "quantity":"transmittance_profile","samples_per_ray":64,
+          "matrix":{{"estimator":[{}],"medium":[{{"type":"linear","optical_depth":1}}],"majorant":[{{"type":"grid","resolution":4}}]}})",
+      honest_estimators()));
+  for (const CellRecord& record : records) {
+    if (record.status == Status::skipped) continue;
+    ASSERT_EQ(record.status, Status::ok) << record.cell.name << record.reason;
+    EXPECT_NEAR(*record.channel[0].mean, *record.channel[0].reference, 0.1) << record.cell.name;
+  }
+}
+
 TEST(Contract, StatisticsDoNotDependOnThreads) {
   const std::string experiment =
       R"("rays":{"type":"orthographic","width":7,"height":5},

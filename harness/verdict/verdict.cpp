@@ -84,43 +84,24 @@ Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
           .within = precise && (test.basis == "counted" || (test.log_e_low >= to_pass && test.log_e_high >= to_pass))};
 }
 
-void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
-  const bool lenient = verdict.tolerate == Tolerate::epsilon;
-  const auto outcome_of = [&](const Proof& proof) {
-    if (proof.beyond || (proof.biased && !lenient)) return Outcome::fail;
-    return proof.within ? Outcome::pass : Outcome::inconclusive;
-  };
-  verdict.unbiased = verdict.own_mean = verdict.lookups = Outcome::none;
-  verdict.biased = verdict.beyond = false;
-  verdict.proves.clear();
-  Outcome& outcome = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
-  const Real alpha = verdict.alpha / static_cast<Real>(verdict.family);
-  const Real alpha_lookups = verdict.alpha / static_cast<Real>(verdict.lookups_family);
-  const auto means = static_cast<std::size_t>(
-      std::count_if(verdict.tests.begin(), verdict.tests.end(), [](const TestRecord& test) { return test.channel >= 0; }));
+namespace {
+
+/// What the tests of the means found.
+struct Found {
+  std::size_t means = 0;
   const TestRecord *failed = nullptr, *open = nullptr, *slightly = nullptr;
   std::vector<const TestRecord*> within;
-  for (TestRecord& test : verdict.tests) {
-    if (test.channel < 0) {
-      test.outcome = verdict.lookups = outcome_of(proven(test, alpha_lookups, verdict.alpha_pass));
-      continue;
-    }
-    const Proof proof = proven(test, alpha, verdict.alpha_pass);
-    verdict.biased |= proof.biased;
-    verdict.beyond |= proof.beyond;
-    test.outcome = outcome_of(proof);
-    if (test.outcome == Outcome::fail && (!failed || test.log_e_fail > failed->log_e_fail)) failed = &test;
-    if (test.outcome == Outcome::inconclusive && !open) open = &test;
-    if (test.outcome == Outcome::pass) within.push_back(&test);
-    if (test.outcome == Outcome::pass && proof.biased) slightly = &test;
-  }
-  verdict.within = means > 0 && within.size() == means;
-  decide_laws(verdict);
-  const bool drawn_as_planned = lenient || verdict.samples_per_ray >= verdict.planned;
+};
+
+/// The outcome of the means, with its reason or what it proves.
+void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std::string>& outputs) {
+  Outcome& outcome = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
+  const Real alpha = verdict.alpha / static_cast<Real>(verdict.family);
+  const bool drawn_as_planned = verdict.tolerate == Tolerate::epsilon || verdict.samples_per_ray >= verdict.planned;
   const auto reason = [&](const TestRecord& test, const std::string& text) {
-    verdict.reason = place_of(test, outputs, means) + text;
+    verdict.reason = place_of(test, outputs, found.means) + text;
   };
-  if (means == 0) {
+  if (found.means == 0) {
     outcome = Outcome::none;
   } else if (verdict.violated) {
     outcome = Outcome::violated;
@@ -131,14 +112,15 @@ void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
   } else if (verdict.out_of_range > 0) {
     outcome = Outcome::fail;
     verdict.reason = fmt::format("{} samples lie outside the declared range", verdict.out_of_range);
-  } else if (failed) {
+  } else if (found.failed) {
     outcome = Outcome::fail;
-    reason(*failed, failure(*failed, proven(*failed, alpha, verdict.alpha_pass), alpha));
-  } else if (open || !drawn_as_planned) {
+    reason(*found.failed, failure(*found.failed, proven(*found.failed, alpha, verdict.alpha_pass), alpha));
+  } else if (found.open || !drawn_as_planned) {
     outcome = Outcome::inconclusive;
     // What the plan knew beforehand says more.
-    if (verdict.reason.empty() && open)
-      reason(*open, fmt::format("undecided after {} samples a ray; {} were planned", verdict.samples_per_ray, verdict.planned));
+    if (verdict.reason.empty() && found.open)
+      reason(*found.open,
+             fmt::format("undecided after {} samples a ray; {} were planned", verdict.samples_per_ray, verdict.planned));
     else if (verdict.reason.empty())
       verdict.reason = fmt::format("within epsilon after {} samples a ray, but {} were planned to look for a smaller bias",
                                    verdict.samples_per_ray, verdict.planned);
@@ -146,9 +128,43 @@ void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
     outcome = Outcome::pass;
     verdict.reason.clear();
     // A mean that the tracker predicts of itself may be biased as it says.
-    verdict.proves = within_text(within, verdict.against == "own mean" ? "|mean - own mean|" : "|bias|");
-    if (slightly) verdict.proves += fmt::format("; biased by less: {}", measured_bias(*slightly));
+    verdict.proves = within_text(found.within, verdict.against == "own mean" ? "|mean - own mean|" : "|bias|");
+    if (found.slightly) verdict.proves += fmt::format("; biased by less: {}", measured_bias(*found.slightly));
   }
+}
+
+}  // namespace
+
+void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
+  const bool lenient = verdict.tolerate == Tolerate::epsilon;
+  const auto outcome_of = [&](const Proof& proof) {
+    if (proof.beyond || (proof.biased && !lenient)) return Outcome::fail;
+    return proof.within ? Outcome::pass : Outcome::inconclusive;
+  };
+  verdict.unbiased = verdict.own_mean = verdict.lookups = Outcome::none;
+  verdict.biased = verdict.beyond = false;
+  verdict.proves.clear();
+  const Real alpha = verdict.alpha / static_cast<Real>(verdict.family);
+  const Real alpha_lookups = verdict.alpha / static_cast<Real>(verdict.lookups_family);
+  Found found;
+  for (TestRecord& test : verdict.tests) {
+    if (test.channel < 0) {
+      test.outcome = verdict.lookups = outcome_of(proven(test, alpha_lookups, verdict.alpha_pass));
+      continue;
+    }
+    ++found.means;
+    const Proof proof = proven(test, alpha, verdict.alpha_pass);
+    verdict.biased |= proof.biased;
+    verdict.beyond |= proof.beyond;
+    test.outcome = outcome_of(proof);
+    if (test.outcome == Outcome::fail && (!found.failed || test.log_e_fail > found.failed->log_e_fail)) found.failed = &test;
+    if (test.outcome == Outcome::inconclusive && !found.open) found.open = &test;
+    if (test.outcome == Outcome::pass) found.within.push_back(&test);
+    if (test.outcome == Outcome::pass && proof.biased) found.slightly = &test;
+  }
+  verdict.within = found.means > 0 && found.within.size() == found.means;
+  decide_laws(verdict);
+  conclude(verdict, found, outputs);
 }
 
 bool tests_walks(const VerdictRecord& verdict) {

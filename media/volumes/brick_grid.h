@@ -235,6 +235,7 @@ Lanes<T, N> BrickGrid::trilinear(Lanes<T, N> x, Lanes<T, N> y, Lanes<T, N> z) co
   return select(inside, mix(face(0), face(kSteps[0]), x), Pack(background_));
 }
 
+// Passes over the same tables, in the order in which memory is known.
 template <class Bricks, class Fill, class ForEach>
 BrickGrid BrickGrid::build(const IndexBox& box, float background, const Bricks& bricks, const Fill& fill,
                            const ForEach& for_each) {
