@@ -32,6 +32,7 @@ std::string statistics_text(const RunRecord& run) {
     json.erase("time");
     json.erase("instructions");
     json.erase("images");
+    json.erase("build");
     text += json.dump() + "\n";
   }
   return text;
