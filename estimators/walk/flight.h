@@ -16,11 +16,12 @@ struct RatePiece {
   T begin, end, rate, inverse_rate, depth_before, depth_after;
 };
 
-/// A piecewise constant sampling rate along a ray, 1/length, with its running depth int_begin^t rate.
+/// A piecewise constant sampling rate along a ray, 1/length, with its running depth int_begin^t rate.  Behind the last piece lies
+/// one of rate 0 and no length, so that a walk always has a piece to ask: on a ray that misses there is no other.
 class Rates {
  public:
   void start(Real begin, Crossing crossing = Crossing::carry) {
-    pieces_.clear();
+    pieces_.assign(1, {begin, begin, 0, kInfinity, 0, 0});
     single_.clear();
     begin_ = begin;
     crossing_ = crossing;
@@ -31,13 +32,14 @@ class Rates {
   void append(Real end, Real rate) {
     const Real from = this->end(), before = total_depth_;
     if (rate > 0) total_depth_ += rate * (end - from);
-    pieces_.push_back({from, end, rate, 1 / rate, before, total_depth_});
+    pieces_.back() = {from, end, rate, 1 / rate, before, total_depth_};
+    pieces_.push_back({end, end, 0, kInfinity, total_depth_, total_depth_});
   }
 
-  std::size_t size() const { return pieces_.size(); }
+  std::size_t size() const { return pieces_.size() - 1; }
   Crossing crossing() const { return crossing_; }
   Real begin() const { return begin_; }
-  Real end() const { return pieces_.empty() ? begin_ : pieces_.back().end; }
+  Real end() const { return pieces_.back().end; }
   Real end(std::size_t i) const { return pieces_[i].end; }
   Real rate(std::size_t i) const { return pieces_[i].rate; }
   Real depth_before(std::size_t i) const { return pieces_[i].depth_before; }
@@ -66,7 +68,7 @@ class Rates {
   }
 
  private:
-  std::vector<RatePiece<Real>> pieces_;
+  std::vector<RatePiece<Real>> pieces_{{0, 0, 0, kInfinity, 0, 0}};
   mutable std::vector<RatePiece<float>> single_;
   Real begin_ = 0, total_depth_ = 0;
   Crossing crossing_ = Crossing::carry;

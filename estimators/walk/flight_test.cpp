@@ -110,7 +110,9 @@ TEST(Flight, VacuumAndEmptyRaysEndAtOnce) {
   none.start(2);
   Flight flight;
   flight.start(none);
+  EXPECT_EQ(flight.rate(), 0) << "before the first flight";
   EXPECT_FALSE(flight.next(rng));
+  EXPECT_EQ(flight.rate(), 0);
   Rates vacuum;
   vacuum.start(0);
   vacuum.append(kInfinity, 0);

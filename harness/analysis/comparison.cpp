@@ -36,9 +36,10 @@ Comparison empty_comparison(const CellRecord& record) {
   comparison.rays = record.ray_set.label;
   comparison.light = transport_label(record.cell.transport);
   comparison.measurement = measurement_label(record.cell.measurement);
+  comparison.build = record.build;
   comparison.name =
       fmt::format("{} | {} | {} | {}", comparison.quantity, comparison.medium, comparison.majorant, comparison.rays);
-  for (const std::string* part : {&comparison.light, &comparison.measurement})
+  for (const std::string* part : {&comparison.light, &comparison.measurement, &comparison.build})
     if (!part->empty()) comparison.name += " | " + *part;
   return comparison;
 }

@@ -55,6 +55,7 @@ struct Remark {
 /// Cells that differ only in the tracker (including its precision and seed), sorted by time to the first target.
 struct Comparison {
   std::string name, quantity, medium, majorant, rays, light, measurement;
+  std::string build;  ///< of cells that another build made than the others of their results: their times are not comparable
   std::vector<RankedCell> cells;             ///< by rank, then by time; those without a rank last
   std::optional<std::size_t> baseline;       ///< the first that stands as unbiased, or the requested one
   std::optional<std::size_t> best_unbiased;  ///< least variance x time among cells that stand as unbiased and have variance

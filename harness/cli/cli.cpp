@@ -12,11 +12,14 @@
 
 #include "harness/analysis/hard_case_table.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/process.h"
 #include "harness/config/schema.h"
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
+#include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
+#include "harness/model/program_name.h"
 #include "harness/performance_gate/required.h"
 #include "harness/registry/estimator_entry.h"
 #include "harness/report/check_text.h"
@@ -48,7 +51,7 @@ void deliver(const std::string& text, const std::string& output) {
 }
 
 ExitCode report(ExitCode code, const std::string& message) {
-  fmt::print(stderr, "nullmark: {}\n", one_line(message));
+  notice("nullmark: {}\n", one_line(message));
   return code;
 }
 
@@ -60,7 +63,7 @@ std::vector<RunRecord> load_all(const std::vector<std::string>& files) {
 }
 
 void warn(const std::string& file, const std::optional<std::string>& remark) {
-  if (remark) fmt::print(stderr, "nullmark: warning: {}: {}\n", file, one_line(*remark));
+  if (remark) notice("nullmark: warning: {}: {}\n", file, one_line(*remark));
 }
 
 /// Throws InputError where the word is none of the names.
@@ -71,6 +74,9 @@ void expect_one_of(const std::string& word, const std::vector<std::string>& name
       "unknown {} \"{}\"; {}", what, word,
       near.empty() ? fmt::format("expected one of {}", fmt::join(names, ", ")) : fmt::format("did you mean \"{}\"?", near)));
 }
+
+constexpr const char* kBuilds =
+    "any: also join cells of the same source by another compiler, C library or instruction set, and mark them; default same";
 
 /// The commands of the program, what they take, and what the user asked of them.
 class CommandLine {
@@ -151,9 +157,10 @@ class CommandLine {
                       "Run a subset in which every pair of estimator, medium, depth and majorant occurs");
     command->add_option("--shard", run_.shard, "Run only part K of N: K/N");
     command->add_flag("--resume", run_.resume, "Continue from the existing results and journal");
+    command->add_option("--builds", run_.builds, kBuilds)->needs("--resume");
     command->add_flag("--force", run_.force, "Replace existing results")->excludes("--resume");
     command->add_flag("--dry-run", run_.dry_run, "Print cells, predicted samples, lookups and time; draw no samples");
-    command->add_option("--time-budget", run_.time_budget, "Start no further cell after this many seconds")
+    command->add_option("--time-budget", run_.time_budget, "End sampling and timing after this many seconds")
         ->check(CLI::Validator(
             [](const std::string& text) {
               double seconds = -1;
@@ -309,11 +316,12 @@ class CommandLine {
       refuse_overwriting(files_, {output_});
       if (!force_ && output_ != "-" && std::filesystem::exists(output_))
         throw InputError(output_ + ": exists; --force replaces it");
-      deliver(results_text(merge_results(load_all(files_), files_)), output_);
+      deliver(results_text(merge_results(load_all(files_), files_, builds_of(builds_))), output_);
       return ExitCode::ok;
     });
     command->add_option("PART", files_, "Results files of the shards of one configuration")->required();
     command->add_option("-o,--output", output_, "Results file; - for standard output")->required();
+    command->add_option("--builds", builds_, kBuilds);
     command->add_flag("--force", force_, "Replace existing results");
   }
 
@@ -340,7 +348,7 @@ class CommandLine {
   ListCommand list_;
   ProceduralVdb volume_;
   std::vector<std::string> files_;
-  std::string file_, baseline_, schema_, format_, output_, junit_, markdown_;
+  std::string file_, baseline_, builds_, schema_, format_, output_, junit_, markdown_;
   bool force_ = false, paired_ = false, cases_ = false, strict_ = false;
 };
 
@@ -376,6 +384,10 @@ ExitCode guarded(int argc, char** argv) {
 }  // namespace
 
 int nullmark_main(int argc, char** argv) {
+  open_closed_descriptors();
+  report_files_that_grow_too_large();
+  tell_of_crashes();
+  if (argc > 0) program_name() = std::filesystem::path(argv[0]).filename().string();
   ExitCode code = guarded(argc, argv);
   // A full disk or a closed pipe shows only here.
   if (std::fflush(stdout) != 0 && code == ExitCode::ok)

@@ -86,7 +86,8 @@ TEST_F(Cli, ResumesFromTheJournalOfAKilledRun) {
   ASSERT_EQ(run("run c.json -o whole.json"), 0);
   const RunRecord whole = results("whole.json");
   {
-    Journal journal((folder_ / "r.json").string(), Json::parse(read("whole.json"))["config_hash"], Journal::Mode::fresh);
+    Journal journal((folder_ / "r.json").string(), Json::parse(read("whole.json"))["config_hash"], Journal::Mode::fresh,
+                    build_of(whole.provenance));
     journal.append(whole.cells[4]);
     EXPECT_EQ(run("run c.json -o r.json --force"), code(ExitCode::input_error)) << "the journal is locked";
   }

@@ -16,6 +16,7 @@ struct RunCommand {
   std::string filter;     ///< regular expression on cell names
   bool covering = false;  ///< only the cells that covering_cells selects
   std::string shard;      ///< "K/N", 1 <= K <= N
+  std::string builds;     ///< "same" or "any"; empty: same
   int threads = 0;
   std::optional<double> time_budget;
   bool resume = false, force = false, dry_run = false, no_timing = false;

@@ -1,10 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
+#include <optional>
 
 #include "harness/analysis/check.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/process.h"
 #include "harness/cli/signals.h"
+#include "harness/cli/watched_run.h"
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
 #include "harness/io/outputs.h"
@@ -14,7 +18,6 @@
 #include "harness/run/medium_contract.h"
 #include "harness/run/progress.h"
 #include "harness/run/provenance.h"
-#include "harness/run/run.h"
 
 namespace nullmark {
 namespace {
@@ -28,7 +31,8 @@ Json component_argument(const std::string& text) {
   return first != std::string::npos && text[first] == '{' ? parse_json(text, "prove") : Json(text);
 }
 
-RunRecord run_battery(const ProveCommand& command, const Battery& battery) {
+/// Runs the battery and hands its results to `conclude`.
+ExitCode run_battery(const ProveCommand& command, const Battery& battery, const std::function<ExitCode(RunRecord)>& conclude) {
   RunOptions options;
   options.timing = false;
   options.threads = command.threads;
@@ -38,26 +42,27 @@ RunRecord run_battery(const ProveCommand& command, const Battery& battery) {
   context.command_line = command.command_line;
   context.threads = command.threads;
   context.selected = static_cast<std::size_t>(std::count(battery.selected.begin(), battery.selected.end(), true));
-  RunRecord run;
-  {
-    Progress progress(context.selected, Progress::Lines::none);
-    RunObserver observer;
-    observer.cell_done = [&](const CellRecord& record, std::size_t done, std::size_t total) {
-      progress.cell_done(record, done, total);
-    };
-    observer.progress = [&](const CellRecord& record, double fraction) { progress.cell_progress(record, fraction); };
-    observer.timing = [](double) {};
-    observer.cell_timed = [](const CellRecord&) {};
-    observer.verdict_share = observer.statistics_share = [](double) {};
-    observer.warning = [&](const std::string& message) { progress.warning(message); };
-    run.cells = run_plan(battery.plan, battery.selected, {}, options, observer);
-  }
-  run.name = battery.plan.name;
-  run.config_text = battery.plan.config_text;
-  run.provenance = make_provenance(context, std::chrono::system_clock::now());
-  // Cells that the tracker's parameters do not allow were never to run.
-  run.provenance["filter"] = "\"scenes that fit\"";
-  return run;
+  std::optional<Progress> progress(std::in_place, context.selected, Progress::Lines::none);
+  RunObserver observer;
+  observer.cell_done = [&](const CellRecord& record, std::size_t done, std::size_t total) {
+    progress->cell_done(record, done, total);
+  };
+  observer.progress = [&](const CellRecord& record, double fraction) { progress->cell_progress(record, fraction); };
+  observer.timing = [](double) {};
+  observer.cell_timed = [](const CellRecord&) {};
+  observer.verdict_share = observer.statistics_share = [](double) {};
+  observer.warning = [&](const std::string& message) { progress->warning(message); };
+  return watched_run(battery.plan, battery.selected, {}, options, observer, [&](std::vector<CellRecord> records) {
+    progress.reset();
+    RunRecord run;
+    run.cells = std::move(records);
+    run.name = battery.plan.name;
+    run.config_text = battery.plan.config_text;
+    run.provenance = make_provenance(context, std::chrono::system_clock::now());
+    // Cells that the tracker's parameters do not allow were never to run.
+    run.provenance["filter"] = "\"scenes that fit\"";
+    return conclude(std::move(run));
+  });
 }
 
 ExitCode prove_medium_alone(const ProveCommand& command, std::string& text) {
@@ -74,6 +79,7 @@ ExitCode prove_medium_alone(const ProveCommand& command, std::string& text) {
 
 ExitCode prove_command(const ProveCommand& command) {
   refuse_overwriting({}, {command.output});
+  expect_threads(command.threads);
   std::string text;
   ExitCode medium_exit = ExitCode::ok;
   if (!command.medium.empty()) {
@@ -84,16 +90,17 @@ ExitCode prove_command(const ProveCommand& command) {
   const Battery battery = make_battery(component_argument(estimator),
                                        command.medium.empty() ? Json() : component_argument(command.medium), command.quick);
   catch_signals();
-  RunRecord run = run_battery(command, battery);
-  const Summary summary = summarise(run);
-  fmt::print("estimator {}\n{}", estimator, scenes_text(run));
-  for (const std::string& one : battery.left_out) fmt::print("not tried: {}\n", one);
-  fmt::print("{}", findings_text(run));
-  for (const std::string& one : summary.undecided_trackers) fmt::print("{}\n", one);
-  if (!summary.nothing_proven.empty()) fmt::print("{}\n", summary.nothing_proven);
-  if (!command.output.empty()) write_atomically(command.output, results_text(run));
-  if (summary.exit == ExitCode::bias_proven || medium_exit != ExitCode::ok) return ExitCode::bias_proven;
-  return summary.exit;
+  return run_battery(command, battery, [&](RunRecord run) {
+    const Summary summary = summarise(run);
+    fmt::print("estimator {}\n{}", estimator, scenes_text(run));
+    for (const std::string& one : battery.left_out) fmt::print("not tried: {}\n", one);
+    fmt::print("{}", findings_text(run));
+    for (const std::string& one : summary.undecided_trackers) fmt::print("{}\n", one);
+    if (!summary.nothing_proven.empty()) fmt::print("{}\n", summary.nothing_proven);
+    if (!command.output.empty()) write_atomically(command.output, results_text(run));
+    if (summary.exit == ExitCode::bias_proven || medium_exit != ExitCode::ok) return ExitCode::bias_proven;
+    return summary.exit;
+  });
 }
 
 }  // namespace nullmark

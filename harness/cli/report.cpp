@@ -2,8 +2,10 @@
 
 #include "harness/cli/commands.h"
 #include "harness/io/file_io.h"
+#include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
+#include "harness/model/program_name.h"
 #include "harness/report/comparison_text.h"
 #include "harness/report/data.h"
 #include "harness/report/figures.h"
@@ -17,17 +19,16 @@ ExitCode report_command(const ReportCommand& command) {
   if (!command.figures.empty()) expect_figures_possible(command.figures);
   std::vector<RunRecord> runs;
   for (const std::string& file : command.results) runs.push_back(read_results(read_file(file), file));
-  std::string words = "nullmark report";
+  std::string words = program_name() + " report";
   for (const std::string& file : command.results) words += " " + file;
   const ReportData data = report_data(runs, command.results, command.baseline, words + " -o " + command.output);
-  for (const std::string& warning : data.warnings) fmt::print(stderr, "nullmark: warning: {}\n", warning);
+  for (const std::string& warning : data.warnings) notice("nullmark: warning: {}\n", warning);
   for (std::size_t i = 0; i < runs.size(); ++i)
-    if (const auto remark = busy_remark(runs[i])) fmt::print(stderr, "nullmark: warning: {}: {}\n", command.results[i], *remark);
+    if (const auto remark = busy_remark(runs[i])) notice("nullmark: warning: {}: {}\n", command.results[i], *remark);
   write_atomically(command.output, report_page(data.json));
   if (!command.markdown.empty()) write_atomically(command.markdown, compare_markdown(runs, command.baseline, true));
-  fmt::print(stderr, "report: {}\n", command.output);
-  if (!command.figures.empty())
-    fmt::print(stderr, "figures: {} in {}\n", write_figures(command.output, command.figures), command.figures);
+  notice("report: {}\n", command.output);
+  if (!command.figures.empty()) notice("figures: {} in {}\n", write_figures(command.output, command.figures), command.figures);
   return ExitCode::ok;
 }
 

@@ -1,5 +1,3 @@
-#include "harness/run/run.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,9 +15,12 @@
 #include <thread>
 
 #include "harness/cli/commands.h"
+#include "harness/cli/process.h"
 #include "harness/cli/signals.h"
+#include "harness/cli/watched_run.h"
 #include "harness/config/config.h"
 #include "harness/io/file_io.h"
+#include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
 #include "harness/io/spec_json.h"
@@ -32,6 +33,7 @@
 #include "harness/run/predict.h"
 #include "harness/run/progress.h"
 #include "harness/run/provenance.h"
+#include "harness/run/resume.h"
 
 namespace nullmark {
 namespace {
@@ -49,7 +51,7 @@ std::optional<std::uint64_t> requested_seed(const std::string& text) {
   if (text == "random") {
     std::random_device device;
     const std::uint64_t seed = (std::uint64_t{device()} << 32) | device();
-    fmt::print(stderr, "nullmark: seed {}\n", seed);
+    notice("nullmark: seed {}\n", seed);
     return seed;
   }
   const auto seed = parsed<std::uint64_t>(text);
@@ -74,6 +76,10 @@ Shard requested_shard(const std::string& text) {
 
 /// The cells of a plan that `--filter` and `--covering` pick.
 std::vector<bool> filtered(const Plan& plan, const RunCommand& command) {
+  // Beyond that std::regex runs out of stack.
+  constexpr std::size_t kLongest = 1000;
+  if (command.filter.size() > kLongest)
+    throw InputError(fmt::format("--filter: found {} characters; expected at most {}", command.filter.size(), kLongest));
   std::regex pattern;
   try {
     pattern = std::regex(command.filter);
@@ -144,39 +150,8 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
       aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
       total_lookups * kNsPerLookup * 1e-9, kNsPerLookup, lookups_to_decide);
   if (any) return ExitCode::ok;
-  fmt::print(stderr, "nullmark: nothing would run: all cells are skipped\n");
+  notice("nullmark: nothing would run: all cells are skipped\n");
   return ExitCode::nothing_ran;
-}
-
-/// What earlier runs of the same configuration left, by place in the plan.
-using Earlier = std::map<std::size_t, CellRecord>;
-
-void keep(const Plan& plan, std::vector<CellRecord> records, Earlier& earlier) {
-  std::map<std::pair<std::string, std::string>, std::size_t> places;
-  for (std::size_t i = 0; i < plan.cells.size(); ++i) places[{plan.cells[i].id, plan.cells[i].name}] = i;
-  for (CellRecord& record : records)
-    if (const auto at = places.find({record.cell.id, record.cell.name}); at != places.end())
-      earlier[at->second] = std::move(record);
-}
-
-/// The record of a cell under the plan's own name for it: cells of different experiments may share statistics.
-CellRecord placed(CellRecord record, const Cell& cell) {
-  const std::uint64_t samples = record.cell.samples_per_ray;
-  record.cell = cell;
-  if (cell.equal_lookups) record.cell.samples_per_ray = samples;
-  return record;
-}
-
-Earlier earlier_results(const Plan& plan, const std::string& output, const Journal& journal) {
-  Earlier earlier;
-  if (std::filesystem::exists(output)) {
-    RunRecord before = read_results(read_file(output), output);
-    if (before.config_text != plan.config_text)
-      throw InputError(output + ": holds results of another configuration or seed; --force replaces them");
-    keep(plan, std::move(before.cells), earlier);
-  }
-  keep(plan, journal.cells(), earlier);
-  return earlier;
 }
 
 /// Files that the run reads: configurations and the volumes of its media.
@@ -206,15 +181,14 @@ ExitCode outcome(const std::vector<CellRecord>& cells) {
     any_ok |= cell.status == Status::ok;
   }
   if (any_ok) return ExitCode::ok;
-  fmt::print(stderr, "nullmark: nothing ran: all cells were skipped or not started\n");
+  notice("nullmark: nothing ran: all cells were skipped or not started\n");
   return ExitCode::nothing_ran;
 }
 
 void warn_of_own_seeds(const Plan& plan, std::uint64_t seed) {
   const auto own = std::find_if(plan.cells.begin(), plan.cells.end(), [&](const Cell& cell) { return cell.seed != seed; });
   if (own != plan.cells.end())
-    fmt::print(stderr, "nullmark: warning: experiment \"{}\" names its seeds itself; --seed does not change them\n",
-               own->experiment);
+    notice("nullmark: warning: experiment \"{}\" names its seeds itself; --seed does not change them\n", own->experiment);
 }
 
 /// Throws InputError where the output may not be written, or is there and neither to be completed nor replaced.
@@ -226,7 +200,8 @@ std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vect
   auto journal = std::make_unique<Journal>(output, config_hash(plan.config_text),
                                            command.resume  ? Mode::resume
                                            : command.force ? Mode::overwrite
-                                                           : Mode::fresh);
+                                                           : Mode::fresh,
+                                           this_build(), builds_of(command.builds));
   if (!command.resume && !command.force && std::filesystem::exists(output))
     throw InputError(output + ": exists; --resume completes it, --force replaces it");
   return journal;
@@ -280,8 +255,27 @@ RunObserver observer_of(Journal* journal, Progress& progress, RunContext& contex
 
 void tell_results(const RunRecord& run, const std::string& output) {
   fmt::print("{}", results_tables(run));
-  fmt::print(stderr, "results: {}\n", output);
-  if (const auto remark = busy_remark(run)) fmt::print(stderr, "nullmark: warning: {}\n", *remark);
+  notice("results: {}\n", output);
+  if (const auto remark = busy_remark(run)) notice("nullmark: warning: {}\n", *remark);
+}
+
+/// To the file, whose journal is done with then, or to standard output where there is no journal.
+ExitCode write_results(const Plan& plan, Earlier cells, const RunContext& context, const std::string& output, Journal* journal) {
+  RunRecord run;
+  run.name = plan.name;
+  run.config_text = plan.config_text;
+  run.provenance = make_provenance(context, std::chrono::system_clock::now());
+  run.tables = plan.tables;
+  run.claims = plan.claims;
+  for (auto& [place, record] : cells) run.cells.push_back(std::move(record));
+  if (journal) {
+    write_atomically(output, results_text(run));
+    journal->remove();
+    tell_results(run, output);
+  } else {
+    fmt::print("{}", results_text(run));
+  }
+  return outcome(run.cells);
 }
 
 }  // namespace
@@ -293,11 +287,11 @@ ExitCode run_command(const RunCommand& command) {
   const std::vector<bool> wanted = filtered(plan, command), selected = of_shard(wanted, command);
   const auto count = static_cast<std::size_t>(std::count(selected.begin(), selected.end(), true));
   if (count == 0) {
-    fmt::print(stderr, "nullmark: nothing selected: none of {} cells passes --filter, --covering and --shard\n",
-               plan.cells.size());
+    notice("nullmark: nothing selected: none of {} cells passes --filter, --covering and --shard\n", plan.cells.size());
     return ExitCode::nothing_ran;
   }
   if (seed) warn_of_own_seeds(plan, *seed);
+  expect_threads(command.threads);
   if (command.dry_run) return dry_run(plan, selected);
 
   const bool to_stdout = command.output == "-";
@@ -306,7 +300,7 @@ ExitCode run_command(const RunCommand& command) {
   Earlier earlier;
   if (!to_stdout) {
     journal = open_journal(command, sources, plan, output);
-    if (command.resume) earlier = earlier_results(plan, output, *journal);
+    if (command.resume) earlier = earlier_results(plan, output, *journal, builds_of(command.builds));
   }
   RunContext context = context_of(command, plan);
   const RunOptions options = options_of(command, to_stdout ? "" : output);
@@ -319,28 +313,14 @@ ExitCode run_command(const RunCommand& command) {
     if (selected[place] && record.status == Status::ok) finished.push_back(placed(record, plan.cells[place]));
 
   catch_signals();
-  RunRecord run;
-  {
-    Progress progress(count - finished.size());
-    std::vector<CellRecord> records = run_plan(plan, selected, finished, options, observer_of(journal.get(), progress, context));
+  std::optional<Progress> progress(count - finished.size());
+  const auto conclude = [&](std::vector<CellRecord> records) {
+    progress.reset();
     for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i)
       if (selected[i] && next < records.size()) earlier[i] = placed(std::move(records[next++]), plan.cells[i]);
-  }
-
-  run.name = plan.name;
-  run.config_text = plan.config_text;
-  run.provenance = make_provenance(context, std::chrono::system_clock::now());
-  run.tables = plan.tables;
-  run.claims = plan.claims;
-  for (auto& [place, record] : earlier) run.cells.push_back(std::move(record));
-  if (to_stdout) {
-    fmt::print("{}", results_text(run));
-  } else {
-    write_atomically(output, results_text(run));
-    journal->remove();
-    tell_results(run, output);
-  }
-  return outcome(run.cells);
+    return write_results(plan, std::move(earlier), context, output, journal.get());
+  };
+  return watched_run(plan, selected, finished, options, observer_of(journal.get(), *progress, context), conclude);
 }
 
 }  // namespace nullmark

@@ -316,6 +316,7 @@ void visit_findings(Visit& visit, CellRecord& record) {
   const auto statistic = [&](std::optional<Real> ChannelRecord::*member) { return ChannelsField{record, member}; };
   visit.required("status", record.status);
   visit.sparse("reason", record.reason);
+  visit.sparse("build", record.build, "compiler, C library and instruction set of the cell, where not those of the provenance");
   visit.sparse("reliance", record.reliance,
                "of an estimator that is handed the exact optical depth: how much of its answer follows that depth, 1 all of it");
   visit.required("mean", statistic(&ChannelRecord::mean), "average over the rays");

@@ -33,6 +33,7 @@ std::string statistics_text(const RunRecord& run) {
     json.erase("instructions");
     json.erase("last_level_misses");
     json.erase("images");
+    json.erase("build");
     text += json.dump() + "\n";
   }
   return text;

@@ -133,6 +133,7 @@ struct CellRecord {
   std::vector<std::string> effects{"absorption"};
   Status status = Status::not_run;
   std::string reason;
+  std::string build;  ///< compiler, C library and instruction set that made the cell, where not those of the results' provenance
   std::uint64_t rays = 0, samples = 0;
   std::string reference_method;
   std::string variance_basis;  ///< "analytic" or "sample"

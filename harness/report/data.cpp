@@ -202,9 +202,17 @@ std::set<std::string> credits(const RunRecord& run) {
   return lines;
 }
 
+/// The name of the program that made the results: that of a plug-in knows its trackers.
+std::string program_of(const Json& provenance) {
+  const Json words = provenance.value("command_line", Json::array());
+  const bool told = !words.empty() && words[0].is_string();
+  const std::string name = told ? std::filesystem::path(words[0].get<std::string>()).filename().string() : "";
+  return name.empty() ? "nullmark" : name;
+}
+
 /// The command that made the results, as a shell takes it, but for the folder of the program.
 std::string command_line(const Json& provenance) {
-  std::string line = "nullmark";
+  std::string line = program_of(provenance);
   const Json words = provenance.value("command_line", Json::array());
   for (std::size_t i = 1; i < words.size(); ++i) {
     const std::string word = words[i].is_string() ? words[i].get<std::string>() : words[i].dump();
@@ -219,13 +227,13 @@ std::string command_line(const Json& provenance) {
 Json run_json(const RunRecord& run, const Summary& summary, const std::string& file) {
   Json provenance = Json::object();
   for (const auto& [key, text] : run.provenance) provenance[key] = known_json(text);
-  const std::string name = std::filesystem::path(file).filename().string();
+  const std::string name = std::filesystem::path(file).filename().string(), program = program_of(provenance);
   return {{"name", run.name},
           {"file", name},
           {"version", measured_by(run)},
           {"remarks", Json::array()},
           {"config_hash", config_hash(run.config_text)},
-          {"commands", {command_line(provenance), "nullmark check " + name, "nullmark compare " + name}},
+          {"commands", {command_line(provenance), program + " check " + name, program + " compare " + name}},
           {"provenance", std::move(provenance)},
           {"verdicts",
            {{"pass", summary.pass},

@@ -120,7 +120,7 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
     record.channels = prepared.scene->medium->medium->channels();
     record.rays = prepared.scene->rays->world.size();
     record.structure = prepared.scene->majorant->structure->size();
-    record.medium_hash = fmt::format("{:016x}", prepared.scene->medium->hash);
+    record.medium_hash = hash_text(*prepared.scene->medium);
     if (record.channels > 1) record.effects.push_back("chromatic");
     if (cell.quantity == Quantity::radiance) record.effects = prepared.effects;
     if (const auto alone = make_estimator(cell.estimator)->kernel(record.channels, cell.precision))
@@ -153,8 +153,8 @@ void fill_statistics(CellRecord& record, const PreparedCell& prepared, const Sam
   record.status = Status::ok;
   if (sampled.nonfinite > 0) {
     record.status = Status::error;
-    record.reason = fmt::format("{} of {} samples are not finite; `nullmark replay` shows the first", sampled.nonfinite,
-                                sampled.counters.samples);
+    record.reason =
+        fmt::format("{} of {} samples are not finite; `replay` shows the first", sampled.nonfinite, sampled.counters.samples);
   }
   record.variance_basis = "sample";
   if (targets.known && targets.names.empty()) record.squared_error_blocks = squared_error_blocks(sampled);

@@ -9,15 +9,18 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "harness/io/file_io.h"
+#include "harness/io/notice.h"
 #include "harness/io/results_json.h"
 #include "harness/io/spec_json.h"
 
 namespace nullmark {
 namespace {
 
-constexpr int kJournalSchema = 1;
+constexpr int kJournalSchema = 2;
+constexpr const char* kHead = "nullmark_journal";
 
 /// Whether the path still leads to the open file: its last owner may have removed it between open and lock.
 bool still_there(int file, const std::string& path) {
@@ -28,7 +31,8 @@ bool still_there(int file, const std::string& path) {
 
 }  // namespace
 
-Journal::Journal(const std::string& results_path, const std::string& config_hash, Mode mode) : path_(path_for(results_path)) {
+Journal::Journal(const std::string& results_path, const std::string& config_hash, Mode mode, Build build, Builds builds)
+    : path_(path_for(results_path)), build_(std::move(build)), builds_(builds) {
   expect_replaceable(results_path);
   lock();
   try {
@@ -65,7 +69,8 @@ void Journal::read(const std::string& config_hash, Mode mode) {
   const std::string text = read_file(path_);
   const std::size_t complete = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
   if (complete == 0 || mode == Mode::overwrite) {
-    write_header(config_hash);
+    if (::ftruncate(file_, 0) != 0) throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
+    write_head(config_hash);
     return;
   }
   if (mode == Mode::fresh)
@@ -74,38 +79,60 @@ void Journal::read(const std::string& config_hash, Mode mode) {
   int number = 0;
   for (std::size_t begin = 0; begin < complete;) {
     const std::size_t end = text.find('\n', begin);
-    const std::string line = text.substr(begin, end - begin);
-    const std::string where = fmt::format("{}:{}", path_, ++number);
+    const std::string line = text.substr(begin, end - begin), where = fmt::format("{}:{}", path_, ++number);
     begin = end + 1;
-    const Json json = parse_json(line, where);
-    const JsonNode node(json, where);
     if (number > 1) {
-      CellRecord record = read_cell(node);
-      const auto same = [&](const CellRecord& other) {
-        return other.cell.id == record.cell.id && other.cell.name == record.cell.name;
-      };
-      cells_.erase(std::remove_if(cells_.begin(), cells_.end(), same), cells_.end());
-      cells_.push_back(std::move(record));
+      read_line(line, where, config_hash);
       continue;
     }
-    node.expect_object();
-    if (node["nullmark_journal"].integer(0, 1'000'000) != kJournalSchema)
-      node["nullmark_journal"].expected(fmt::format("{}, the journal this program writes", kJournalSchema));
-    if (const JsonNode version = node[kVersionKey]; version.string() != RunRecord::kVersion)
-      version.expected(fmt::format("\"{}\", which this program writes", RunRecord::kVersion));
-    if (node["config_hash"].string() != config_hash)
-      node["config_hash"].expected(
-          fmt::format("\"{}\": the journal is of another configuration or seed; --force starts again", config_hash));
+    const Json head = parse_json(line, where);
+    read_head(JsonNode(head, where), config_hash);
   }
   holds_cells_ = !cells_.empty();
   if (complete < text.size() && ::ftruncate(file_, static_cast<off_t>(complete)) != 0)
     throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
+  // Cells that this run appends are of its own build.
+  if (of_lines_.environment != build_.environment || of_lines_.plugin_hash != build_.plugin_hash) write_head(config_hash);
 }
 
-void Journal::write_header(const std::string& config_hash) {
-  if (::ftruncate(file_, 0) != 0) throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
-  const Json header = {{"nullmark_journal", kJournalSchema}, {kVersionKey, RunRecord::kVersion}, {"config_hash", config_hash}};
-  write_durably(file_, header.dump() + "\n", path_);
+/// The cells after it are of the build that it names.
+void Journal::read_head(const JsonNode& node, const std::string& config_hash) {
+  node.expect_object();
+  if (node[kHead].integer(0, 1'000'000) != kJournalSchema)
+    node[kHead].expected(fmt::format("{}, the journal this program writes", kJournalSchema));
+  if (const JsonNode version = node[kVersionKey]; version.string() != RunRecord::kVersion)
+    version.expected(fmt::format("\"{}\", which this program writes", RunRecord::kVersion));
+  if (node["config_hash"].string() != config_hash)
+    node["config_hash"].expected(
+        fmt::format("\"{}\": the journal is of another configuration or seed; --force starts again", config_hash));
+  of_lines_ = read_build(node["build"]);
+  expect_joinable(path_, of_lines_, "this program", build_, builds_);
+}
+
+void Journal::read_line(const std::string& line, const std::string& where, const std::string& config_hash) {
+  Json json;
+  CellRecord record;
+  try {
+    json = parse_json(line, where);
+    if (!json.contains(kHead)) record = read_cell(JsonNode(json, where));
+  } catch (const InputError& error) {
+    // What another program wrote there costs the cell of that line, not the others.
+    notice("nullmark: warning: {}; the line is skipped\n", error.what());
+    return;
+  }
+  if (json.contains(kHead)) return read_head(JsonNode(json, where), config_hash);
+  const auto same = [&](const CellRecord& other) {
+    return other.cell.id == record.cell.id && other.cell.name == record.cell.name;
+  };
+  cells_.erase(std::remove_if(cells_.begin(), cells_.end(), same), cells_.end());
+  mark_build(record, of_lines_, build_);
+  cells_.push_back(std::move(record));
+}
+
+void Journal::write_head(const std::string& config_hash) {
+  const Json head = {
+      {kHead, kJournalSchema}, {kVersionKey, RunRecord::kVersion}, {"config_hash", config_hash}, {"build", build_json(build_)}};
+  write_durably(file_, head.dump() + "\n", path_);
 }
 
 void Journal::append(const CellRecord& record) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "harness/model/record.h"
+#include "harness/run/build.h"
 
 namespace nullmark {
 
@@ -18,9 +19,11 @@ class Journal {
     overwrite  ///< discards an existing journal
   };
 
-  /// Throws InputError if another run holds the lock, if the journal belongs to another configuration, or if it is damaged before
-  /// its last line.  A damaged last line, which a kill can leave, is dropped.
-  Journal(const std::string& results_path, const std::string& config_hash, Mode mode);
+  /// Throws InputError if another run holds the lock, or if the journal belongs to another configuration or to a build whose
+  /// cells may not be joined with those of `build`, that of the run; cells of one that may are marked.  A damaged last line,
+  /// which a kill can leave, is dropped; any other line that is no cell is skipped with a warning.
+  Journal(const std::string& results_path, const std::string& config_hash, Mode mode, Build build = this_build(),
+          Builds builds = Builds::same);
   /// Keeps the file for a later resume if it holds cells, removes it otherwise.
   ~Journal();
   Journal(const Journal&) = delete;
@@ -39,11 +42,15 @@ class Journal {
  private:
   void lock();
   void read(const std::string& config_hash, Mode mode);
-  void write_header(const std::string& config_hash);
+  void read_head(const JsonNode& node, const std::string& config_hash);
+  void read_line(const std::string& line, const std::string& where, const std::string& config_hash);
+  void write_head(const std::string& config_hash);
 
   std::string path_;
   int file_ = -1;
   bool holds_cells_ = false;
+  Build build_, of_lines_;  ///< of this run; of the lines that are being read
+  Builds builds_;
   std::vector<CellRecord> cells_;
 };
 

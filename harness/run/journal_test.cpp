@@ -67,12 +67,29 @@ TEST_F(JournalTest, DropsATornLastLineAndGoesOnAfterIt) {
   }
 }
 
-TEST_F(JournalTest, RefusesDamageElsewhere) {
+TEST_F(JournalTest, SkipsALineThatIsNoCellWithAWarning) {
   leave({cells_[0], cells_[1]});
-  std::string text = read_file(path_);
-  text[text.find("\"id\"")] = '?';
-  std::ofstream(path_, std::ios::binary | std::ios::trunc) << text;
-  EXPECT_NE(open_error("hash", Journal::Mode::resume).find(path_ + ":2"), std::string::npos);
+  const std::string text = read_file(path_);
+  const std::size_t second = text.find('\n') + 1, third = text.find('\n', second) + 1;
+  std::string damaged = text;
+  damaged[damaged.find("\"id\"")] = '?';
+  const std::string among = text.substr(0, third) + "[1/2] a line of progress: ok\n" + text.substr(third);
+  for (const auto& [content, kept, line] : {std::tuple{damaged, 1u, ":2"}, std::tuple{among, 2u, ":3"}}) {
+    std::ofstream(path_, std::ios::binary | std::ios::trunc) << content;
+    ::testing::internal::CaptureStderr();
+    const Journal journal(results_, "hash", Journal::Mode::resume);
+    const std::string warning = ::testing::internal::GetCapturedStderr();
+    EXPECT_EQ(journal.cells().size(), kept);
+    EXPECT_NE(warning.find("warning: " + path_ + line), std::string::npos) << warning;
+    EXPECT_EQ(std::count(warning.begin(), warning.end(), '\n'), 1) << warning;
+  }
+}
+
+TEST_F(JournalTest, RefusesADamagedHead) {
+  leave({cells_[0]});
+  const std::string text = read_file(path_);
+  std::ofstream(path_, std::ios::binary | std::ios::trunc) << "[1/2] a line of progress: ok\n" << text;
+  EXPECT_NE(open_error("hash", Journal::Mode::resume).find(path_ + ":1"), std::string::npos);
 }
 
 TEST_F(JournalTest, RefusesAnotherConfiguration) {

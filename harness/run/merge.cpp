@@ -38,14 +38,13 @@ std::array<std::string, 3> selection(const RunRecord& run) {
   return {text("filter"), text("covering"), text("selected")};
 }
 
-}  // namespace
+struct Found {
+  const CellRecord* record;
+  std::size_t part;
+};
 
-RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<std::string>& names) {
-  if (parts.empty()) throw InputError("found no results to merge; expected at least one file");
-  struct Found {
-    const CellRecord* record;
-    std::size_t part;
-  };
+/// Cells of all parts by name, each the one that tells most.
+std::map<std::string, Found> found_cells(const std::vector<RunRecord>& parts, const std::vector<std::string>& names) {
   std::map<std::string, Found> cells;
   for (std::size_t part = 0; part < parts.size(); ++part) {
     if (parts[part].config_text != parts[0].config_text)
@@ -58,10 +57,44 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
       if (sampled(record) && sampled(other) && statistics_of(record) != statistics_of(other))
         throw InputError(fmt::format("{}: cell \"{}\" has other statistics than in {}; expected the same to the last bit",
                                      names[part], record.cell.name, names[at->second.part]));
-      at->second.record = better(at->second.record, &record);
+      if (const CellRecord* best = better(at->second.record, &record); best == &record) at->second = {best, part};
     }
   }
+  return cells;
+}
 
+/// The data that cells of each medium of the plan were sampled in.
+class MediaSeen {
+ public:
+  explicit MediaSeen(const std::vector<std::string>& names) : names_(names) {}
+
+  /// Throws InputError where others of the medium were sampled in other data.
+  void add(std::size_t medium, const CellRecord& record, std::size_t part) {
+    if (record.medium_hash.empty()) return;
+    const auto [at, fresh] = seen_.emplace(medium, std::pair(record.medium_hash, part));
+    if (fresh || at->second.first == record.medium_hash) return;
+    throw InputError(fmt::format(
+        "{}: cell \"{}\": found the medium {} of hash {}; expected {}, as in {}: its data were replaced; "
+        "run its cells again",
+        names_[part], record.cell.name, record.medium.label, record.medium_hash, at->second.first, names_[at->second.second]));
+  }
+
+ private:
+  const std::vector<std::string>& names_;
+  std::map<std::size_t, std::pair<std::string, std::size_t>> seen_;
+};
+
+}  // namespace
+
+RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<std::string>& names, Builds builds) {
+  if (parts.empty()) throw InputError("found no results to merge; expected at least one file");
+  std::vector<Build> made_by;
+  for (std::size_t part = 0; part < parts.size(); ++part) {
+    made_by.push_back(build_of(parts[part].provenance));
+    expect_joinable(names[part], made_by[part], names[0], made_by[0], builds);
+  }
+  std::map<std::string, Found> cells = found_cells(parts, names);
+  MediaSeen media(names);
   RunRecord merged;
   merged.name = parts[0].name;
   merged.config_text = parts[0].config_text;
@@ -85,7 +118,9 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
   }
   for (const Cell& cell : read_config(parts[0].config_text, names[0] + "#config").cells)
     if (const auto at = cells.find(cell.name); at != cells.end()) {
+      media.add(cell.medium, *at->second.record, at->second.part);
       merged.cells.push_back(*at->second.record);
+      mark_build(merged.cells.back(), made_by[at->second.part], made_by[0]);
       cells.erase(at);
     }
   if (!cells.empty())

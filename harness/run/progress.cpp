@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 
+#include "harness/io/notice.h"
 #include "harness/io/results_json.h"
 #include "harness/model/names.h"
 
@@ -48,8 +48,8 @@ void Progress::cell_done(const CellRecord& record, std::size_t done, std::size_t
     return;
   }
   if (!lines_) return;
-  fmt::print(stderr, "[{}/{}] {}: {}{}\n", done, total, record.cell.name, to_string(record.status),
-             record.reason.empty() ? "" : " (" + record.reason + ")");
+  notice("[{}/{}] {}: {}{}\n", done, total, record.cell.name, to_string(record.status),
+         record.reason.empty() ? "" : " (" + record.reason + ")");
 }
 
 void Progress::timing(double fraction) {
@@ -59,14 +59,14 @@ void Progress::timing(double fraction) {
   if (terminal_) {
     draw(static_cast<double>(total_), text);
   } else if (timed > timed_) {
-    fmt::print(stderr, "{}\n", text);
+    notice("{}\n", text);
   }
   timed_ = timed;
 }
 
 void Progress::warning(const std::string& message) {
   clear();
-  fmt::print(stderr, "nullmark: warning: {}\n", message);
+  notice("nullmark: warning: {}\n", message);
 }
 
 void Progress::draw(double done, const std::string& doing) {
@@ -79,15 +79,13 @@ void Progress::draw(double done, const std::string& doing) {
   const auto filled = static_cast<std::size_t>(fraction * kBar);
   const std::string bar = std::string(filled, '#') + std::string(kBar - filled, '.');
   const std::string left = fraction > 0 && fraction < 1 ? duration(seconds * (1 - fraction) / fraction) + " left  " : "";
-  fmt::print(stderr, "\r\x1b[K{}{}{} {}/{} cells  {}{}", colour_ ? "\x1b[32m" : "", bar, colour_ ? "\x1b[0m" : "", done_, total_,
-             left, doing.substr(0, kNameColumns));
-  std::fflush(stderr);
+  notice("\r\x1b[K{}{}{} {}/{} cells  {}{}", colour_ ? "\x1b[32m" : "", bar, colour_ ? "\x1b[0m" : "", done_, total_, left,
+         doing.substr(0, kNameColumns));
 }
 
 void Progress::clear() {
   if (!drawn_) return;
-  fmt::print(stderr, "\r\x1b[K");
-  std::fflush(stderr);
+  notice("\r\x1b[K");
   drawn_ = false;
 }
 

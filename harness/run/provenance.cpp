@@ -13,12 +13,21 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <vector>
 
-#include "commit.h"
+#include "harness/model/hash.h"
+#include "harness/model/program_name.h"
+#include "harness/registry/plugin.h"
+#include "harness/run/source_state.h"
 
 #ifdef __GLIBC__
 #include <gnu/libc-version.h>
 #endif
+
+extern "C" {
+/// The program of the tree defines it, and no other that is linked with these libraries.
+[[gnu::weak]] extern const char nullmark_itself;
+}
 
 namespace nullmark {
 namespace {
@@ -76,7 +85,28 @@ Json libraries() {
           {"cli11", CLI11_VERSION}};
 }
 
-constexpr bool kDirty = NULLMARK_GIT_DIRTY != 0;
+/// Of this executable, 16 hexadecimal digits.
+std::string executable_hash() {
+  std::ifstream file("/proc/self/exe", std::ios::binary);
+  std::vector<char> part(std::size_t{1} << 20);
+  std::uint64_t hash = fnv1a("");
+  while (file.read(part.data(), static_cast<std::streamsize>(part.size())) || file.gcount() > 0)
+    hash = fnv1a({part.data(), static_cast<std::size_t>(file.gcount())}, hash);
+  return fmt::format("{:016x}", hash);
+}
+
+/// Null for nullmark itself; of another program what it says of itself, and what it is.
+Json plugin() {
+  static const Json plugin = []() -> Json {
+    if (&nullmark_itself != nullptr) return nullptr;
+    const std::vector<PluginEntry>& stated = Registry<PluginEntry>::instance().entries();
+    const bool known = !stated.empty();
+    return {{"name", known ? stated[0].name : program_name()},
+            {"version", known ? stated[0].version : "unknown"},
+            {"hash", executable_hash()}};
+  }();
+  return plugin;
+}
 
 }  // namespace
 
@@ -86,11 +116,12 @@ std::string iso_time(std::chrono::system_clock::time_point time) {
 
 std::map<std::string, std::string> make_provenance(const RunContext& context, std::chrono::system_clock::time_point end) {
   const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
+  const SourceState source = source_state();
   const double seconds = std::chrono::duration<double>(end - context.start).count();
   std::map<std::string, std::string> provenance = {
       {"version", text(NULLMARK_VERSION)},
-      {"git", text({{"commit", NULLMARK_GIT_COMMIT}, {"dirty", kDirty}})},
-      {"compiler", text({{"name", compiler()}, {"flags", NULLMARK_COMPILER_FLAGS}, {"build_type", NULLMARK_BUILD_TYPE}})},
+      {"git", text({{"commit", source.commit}, {"dirty", source.dirty}, {"changes", source.changes}})},
+      {"compiler", text({{"name", compiler()}, {"flags", source.compiler_flags}, {"build_type", NULLMARK_BUILD_TYPE}})},
       {"libc", text(libc())},
       {"cpu", text({{"model", cpu_model()}, {"cores", std::thread::hardware_concurrency()}})},
       {"threads", text(context.threads)},
@@ -104,6 +135,7 @@ std::map<std::string, std::string> make_provenance(const RunContext& context, st
       {"selected", text(context.selected)},
       {"start", text(iso_time(context.start))},
       {"seconds", text(seconds)}};
+  if (const Json other = plugin(); !other.is_null()) provenance["plugin"] = text(other);
   if (!context.filter.empty()) provenance["filter"] = text(context.filter);
   if (context.covering) provenance["covering"] = text(true);
   if (!context.shard.empty()) provenance["shard"] = text(context.shard);
@@ -111,7 +143,8 @@ std::map<std::string, std::string> make_provenance(const RunContext& context, st
 }
 
 std::string version_line() {
-  return fmt::format("nullmark {} (commit {}{}; {})", NULLMARK_VERSION, NULLMARK_GIT_COMMIT, kDirty ? ", dirty" : "",
+  const SourceState source = source_state();
+  return fmt::format("nullmark {} (commit {}{}; {})", NULLMARK_VERSION, source.commit, source.dirty ? ", dirty" : "",
                      NULLMARK_BUILD_TYPE);
 }
 

@@ -9,7 +9,7 @@
 
 namespace nullmark {
 
-/// Provenance of a run: source, compiler, machine, libraries, command; values are JSON texts.  No host name.
+/// Provenance of a run: source, plug-in, compiler, machine, libraries, command; values are JSON texts.  No host name.
 struct RunContext {
   std::vector<std::string> command_line;
   int threads = 0;            ///< cores used

@@ -16,9 +16,12 @@
 #include <mutex>
 #include <thread>
 
+#include "harness/io/json_input.h"
+#include "harness/model/in_flight.h"
 #include "harness/run/cell_images.h"
 #include "harness/run/cell_record.h"
 #include "harness/run/task_thread.h"
+#include "harness/sampling/failure.h"
 #include "harness/sampling/test_families.h"
 #include "harness/sampling/timing.h"
 #include "harness/verdict/judge.h"
@@ -40,12 +43,12 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
   CellOutcome outcome{blank_record(plan, prepared), {}};
   CellRecord& record = outcome.record;
   if (!prepared.reason.empty()) {
-    record.status = Status::skipped;
+    record.status = prepared.failure.empty() ? Status::skipped : Status::error;
     record.reason = prepared.reason;
     return outcome;
   }
   const auto stop = [&] { return given_up() || late(); };
-  const auto why = [&] { return given_up() ? "interrupted" : "time budget spent"; };
+  const auto why = [&] { return given_up() ? kInterrupted : kBudgetSpent; };
   if (stop()) {
     record.reason = why();
     return outcome;
@@ -70,8 +73,8 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
   if (record.status == Status::ok && verdict && verdict->nonfinite > 0) {
     record.status = Status::error;
     record.nonfinite += verdict->nonfinite;
-    record.reason = fmt::format("{} samples are not finite, among those drawn for the verdict; `nullmark replay` shows the first",
-                                verdict->nonfinite);
+    record.reason =
+        fmt::format("{} samples are not finite, among those drawn for the verdict; `replay` shows the first", verdict->nonfinite);
   }
   if (record.status == Status::ok && outcome.effort.overruns > 0) {
     record.status = Status::error;
@@ -84,6 +87,20 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     drop_sampled_statistics(record);
   }
   write_images(record, prepared, *sampled, options, observer);
+  return outcome;
+}
+
+/// The same; what a tracker throws makes an error of its cell alone.
+CellOutcome run_or_fail(const Plan& plan, PreparedCell& prepared, const Families& families, const std::function<bool()>& late,
+                        const RunOptions& options, const RunObserver& observer, const std::function<bool()>& given_up) {
+  const InFlight named(prepared.cell->name);
+  CellOutcome outcome;
+  const std::string failure = failure_of<InputError, ParameterError, std::bad_alloc>(
+      [&] { outcome = run_cell(plan, prepared, families, late, options, observer, given_up); });
+  if (failure.empty()) return outcome;
+  outcome = {blank_record(plan, prepared), {}};
+  outcome.record.status = Status::error;
+  outcome.record.reason = failure;
   return outcome;
 }
 
@@ -110,7 +127,8 @@ void for_each_in_order(std::size_t count, int threads, std::atomic<bool>& failed
 
 /// Samples and judges cells on all threads, and tells of each when it is done.
 std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& cells, int threads, const RunOptions& options,
-                                   const RunObserver& observer, Clock::time_point start, const std::function<bool()>& stop) {
+                                   const RunObserver& observer, const std::function<bool()>& late,
+                                   const std::function<bool()>& stop) {
   const Families families{mean_family(plan), lookups_family(plan), laws_family(plan)};
   std::vector<CellOutcome> outcomes(cells.size());
   std::mutex telling;
@@ -118,9 +136,6 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
   std::size_t done = 0;
   std::atomic<bool> failed = false;
   const auto given_up = [&] { return stop() || failed || teller.failed(); };
-  const auto late = [&] {
-    return options.time_budget && std::chrono::duration<double>(Clock::now() - start).count() > *options.time_budget;
-  };
   RunObserver guarded = observer;
   guarded.warning = [&](const std::string& message) {
     const std::lock_guard lock(telling);
@@ -131,7 +146,7 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
     if (const std::unique_lock lock(telling, std::try_to_lock); lock) observer.progress(record, fraction);
   };
   for_each_in_order(cells.size(), threads, failed, [&](std::size_t i) {
-    outcomes[i] = run_cell(plan, cells[i], families, late, options, guarded, given_up);
+    outcomes[i] = run_or_fail(plan, cells[i], families, late, options, guarded, given_up);
     teller.add([&, i] {
       const std::lock_guard lock(telling);
       observer.cell_done(outcomes[i].record, ++done, cells.size());
@@ -158,14 +173,45 @@ void time_records(const std::vector<const PreparedCell*>& cells, const TimingPla
   }
 }
 
+/// Throws InputError where a finished cell was sampled in other data than its medium has now.
+void expect_same_media(CellPreparer& preparer, const Plan& plan, const Records& finished) {
+  for (const auto& [index, record] : finished) {
+    const std::string now = record.medium_hash.empty() ? "" : preparer.medium_hash(plan.cells[index].medium);
+    if (now.empty() || now == record.medium_hash) continue;
+    throw InputError(
+        fmt::format("cell \"{}\": found the medium {} of hash {}; expected {}, as when the cell was sampled: its data "
+                    "were replaced; --force runs all cells again",
+                    record.cell.name, record.medium.label, now, record.medium_hash));
+  }
+}
+
 }  // namespace
+
+std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selected,
+                                const std::map<std::string, CellRecord>& finished, const std::string& reason) {
+  std::vector<CellRecord> records;
+  for (std::size_t i = 0; i < plan.cells.size(); ++i) {
+    if (!selected[i]) continue;
+    if (const auto at = finished.find(plan.cells[i].name); at != finished.end()) {
+      records.push_back(at->second);
+      continue;
+    }
+    records.push_back(blank_record(plan, unprepared(plan, i)));
+    records.back().reason = reason;
+  }
+  return records;
+}
 
 std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
                                  const RunOptions& options, const RunObserver& observer) {
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(std::max(1, threads)));
   const auto start = Clock::now();
-  const auto stop = [&] { return options.interrupted && options.interrupted->load() != 0; };
+  const std::function<bool()> stop = [&] { return options.interrupted && options.interrupted->load() != 0; };
+  const std::function<bool()> late = [&] {
+    return options.time_budget && std::chrono::duration<double>(Clock::now() - start).count() > *options.time_budget;
+  };
+  const std::function<bool()> ended = [&] { return stop() || late(); };
 
   Records records;
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
@@ -174,26 +220,32 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
 
   const bool timing = options.timing && plan.timing.enabled;
   CellPreparer preparer(plan);
-  std::vector<PreparedCell> cells =
-      prepare_all(preparer, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); });
+  expect_same_media(preparer, plan, records);
+  std::vector<PreparedCell> cells = prepare_all(
+      preparer, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); }, ended);
   // Statistics of a resumed run stand; a run that was stopped before or while timing still owes the times.
-  const std::vector<PreparedCell> untimed = prepare_all(preparer, plan, [&](std::size_t i) {
-    const auto record = records.find(i);
-    return timing && record != records.end() && record->second.status == Status::ok && !record->second.time;
-  });
-  if (!stop()) add_theory(cells);
-  std::vector<CellOutcome> outcomes = run_cells(plan, cells, threads, options, observer, start, stop);
+  const std::vector<PreparedCell> untimed = prepare_all(
+      preparer, plan,
+      [&](std::size_t i) {
+        const auto record = records.find(i);
+        return timing && record != records.end() && record->second.status == Status::ok && !record->second.time &&
+               record->second.build.empty();
+      },
+      ended);
+  add_theory(cells, ended);
+  std::vector<CellOutcome> outcomes = run_cells(plan, cells, threads, options, observer, late, stop);
 
   std::vector<const PreparedCell*> to_time;
   to_time.reserve(untimed.size() + cells.size());
-  for (const PreparedCell& prepared : untimed) to_time.push_back(&prepared);
+  for (const PreparedCell& prepared : untimed)
+    if (prepared.scene) to_time.push_back(&prepared);
   Effort effort;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     effort += outcomes[i].effort;
     if (outcomes[i].record.status == Status::ok) to_time.push_back(&cells[i]);
     records[cells[i].index] = std::move(outcomes[i].record);
   }
-  if (timing && !to_time.empty() && !stop()) time_records(to_time, plan.timing, records, observer, stop);
+  if (timing && !to_time.empty() && !ended()) time_records(to_time, plan.timing, records, observer, ended);
   if (effort.working > 0) {
     observer.verdict_share(effort.judging / (effort.working - effort.judging));
     observer.statistics_share(effort.statistics / (effort.working - effort.statistics));

@@ -2,8 +2,10 @@
 
 #include <atomic>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "harness/model/plan.h"
 #include "harness/model/record.h"
@@ -13,7 +15,7 @@ namespace nullmark {
 /// Options of a run; none changes statistics.
 struct RunOptions {
   int threads = 0;                    ///< 0: all cores
-  std::optional<double> time_budget;  ///< seconds; decides which cells are started
+  std::optional<double> time_budget;  ///< seconds; cells and times that are not done by then are left out
   bool timing = true;
   std::string image_directory;                    ///< empty: no images are written
   std::string image_prefix;                       ///< path of that directory as the results file names it
@@ -33,9 +35,18 @@ struct RunObserver {
   std::function<void(const std::string&)> warning = [](const std::string&) {};
 };
 
+/// Why cells were not run.
+inline constexpr const char *kInterrupted = "interrupted", *kBudgetSpent = "time budget spent";
+
+/// Records in plan order of a run that was cut off: those that are `finished`, by name, and for the others that they were not
+/// run.
+std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selected,
+                                const std::map<std::string, CellRecord>& finished, const std::string& reason);
+
 /// Runs the cells for which `selected` is true.  They start in plan order, as many at once as there are threads.  `finished`
 /// holds records that need not run again.  The result holds every selected cell, in plan order.  Throws ParameterError (with a
-/// JSON pointer as `parameter`) for specifications that do not fit their media.
+/// JSON pointer as `parameter`) for specifications that do not fit their media, and InputError where the data of a medium are not
+/// those that a finished cell was sampled in.
 std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
                                  const RunOptions& options, const RunObserver& observer);
 

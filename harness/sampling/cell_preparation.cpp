@@ -7,9 +7,11 @@
 #include <cmath>
 
 #include "harness/kernel/path_kernel.h"
+#include "harness/model/in_flight.h"
 #include "harness/model/names.h"
 #include "harness/registry/components.h"
 #include "harness/sampling/build_transport.h"
+#include "harness/sampling/failure.h"
 #include "harness/sampling/ray_memory.h"
 
 namespace nullmark {
@@ -30,6 +32,12 @@ constexpr Real kDeepestSingle = 1 << 14;
 /// Of a medium from its frame's origin, in its own sizes: its inside is still told to 2^-14.
 constexpr Real kFarthestSingle = 1 << 10, kFarthestDouble = 0x1p39;
 
+/// What a tracker throws is its cell's failure; a mistake in the configuration and a lack of memory are not.
+template <class F>
+std::string tracker_failure(F&& f) {
+  return failure_of<ParameterError, MissingData, std::bad_alloc>(f);
+}
+
 template <class Key, class Value, class Make>
 std::shared_ptr<const Value> once(std::map<Key, std::shared_ptr<const Value>>& cache, const Key& key, Make&& make) {
   std::shared_ptr<const Value>& entry = cache[key];
@@ -41,10 +49,8 @@ std::shared_ptr<const Value> once(std::map<Key, std::shared_ptr<const Value>>& c
 
 PreparedCell CellPreparer::prepare(std::size_t index) {
   const Cell& cell = plan_.cells[index];
-  PreparedCell prepared;
-  prepared.cell = &cell;
-  prepared.index = index;
-  prepared.samples_per_ray = cell.samples_per_ray;
+  PreparedCell prepared = unprepared(plan_, index);
+  const InFlight named(cell.name);
   const MediumSpec& spec = plan_.media[cell.medium];
   if (const auto missing = missing_.find(cell.medium); missing != missing_.end()) {
     prepared.reason = missing->second;
@@ -59,6 +65,14 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
     prepared.reason = missing_[cell.medium] = error.what();
     return prepared;
   }
+  prepared.failure = tracker_failure([&] { add_kernel(prepared); });
+  if (!prepared.failure.empty()) prepared.reason = prepared.failure;
+  return prepared;
+}
+
+/// The tracker of a cell whose scene is built.
+void CellPreparer::add_kernel(PreparedCell& prepared) {
+  const Cell& cell = *prepared.cell;
   const auto source = located(cell.estimator.pointer, [&] { return make_estimator(cell.estimator); });
   located(cell.estimator.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
   prepared.claim = source->claim(cell.quantity);
@@ -72,7 +86,6 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
   }
   if (prepared.reason.empty())
     prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity, cell.reference);
-  return prepared;
 }
 
 /// The kernel of a radiance, composed from the scene's effects.
@@ -141,6 +154,21 @@ Real CellPreparer::deepest_majorant(const Scene& scene) {
   return deepest;
 }
 
+std::shared_ptr<const BuiltMedium> CellPreparer::medium(std::size_t index) {
+  return once(media_, index, [&] {
+    return located(plan_.media[index].field.pointer,
+                   [&] { return std::make_shared<const BuiltMedium>(build_medium(plan_.media[index])); });
+  });
+}
+
+std::string CellPreparer::medium_hash(std::size_t index) {
+  try {
+    return hash_text(*medium(index));
+  } catch (const MissingData&) {
+    return "";
+  }
+}
+
 std::shared_ptr<const Scene> CellPreparer::scene(const Cell& cell) {
   const bool told_at_marks = cell.quantity == Quantity::transmittance_profile || cell.quantity == Quantity::free_path;
   const std::size_t kind = told_at_marks ? static_cast<std::size_t>(cell.quantity) : 0;
@@ -150,10 +178,7 @@ std::shared_ptr<const Scene> CellPreparer::scene(const Cell& cell) {
   const std::size_t cut = static_cast<std::size_t>(std::find(cuts_.begin(), cuts_.end(), surfaces) - cuts_.begin());
   if (cut == cuts_.size()) cuts_.push_back(surfaces);
   return once(scenes_, std::array{cell.medium, cell.majorant, cell.rays, kind, cut}, [&] {
-    const auto medium = once(media_, cell.medium, [&] {
-      return located(plan_.media[cell.medium].field.pointer,
-                     [&] { return std::make_shared<const BuiltMedium>(build_medium(plan_.media[cell.medium])); });
-    });
+    const auto medium = this->medium(cell.medium);
     const Component& majorant = plan_.majorants[cell.majorant];
     const auto structure = once(structures_, std::array{cell.medium, cell.majorant}, [&] {
       return located(majorant.pointer, [&] { return std::make_shared<const BuiltMajorant>(build_majorant(majorant, *medium)); });
@@ -176,35 +201,81 @@ std::shared_ptr<const Scene> CellPreparer::scene(const Cell& cell) {
   });
 }
 
-std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted) {
+PreparedCell unprepared(const Plan& plan, std::size_t index) {
+  PreparedCell prepared;
+  prepared.cell = &plan.cells[index];
+  prepared.index = index;
+  prepared.samples_per_ray = prepared.cell->samples_per_ray;
+  return prepared;
+}
+
+std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted,
+                                      const std::function<bool()>& stop) {
   expect_rays_fit(plan, wanted);
   std::vector<PreparedCell> cells;
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
-    if (wanted(i)) cells.push_back(preparer.prepare(i));
+    if (wanted(i)) cells.push_back(stop() ? unprepared(plan, i) : preparer.prepare(i));
   return cells;
 }
 
-void add_theory(std::vector<PreparedCell>& cells) {
+namespace {
+
+/// Beyond this a double does not tell two counts of samples apart.
+constexpr Real kMostSamples = 0x1p53;
+
+/// As many samples as take the given lookups.
+void equalise(PreparedCell& prepared, Real wanted) {
+  if (!prepared.theory.lookups || !(*prepared.theory.lookups > 0)) {
+    prepared.reason = "equal_lookups needs an estimator and medium with known expected lookups above 0";
+    return;
+  }
+  const Real samples = wanted / *prepared.theory.lookups;
+  if (samples <= kMostSamples)
+    prepared.samples_per_ray = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(samples)));
+  else
+    prepared.reason = fmt::format("equal_lookups {:.3g} makes {:.3g} samples a ray of {:.3g} lookups each; expected at most 2^53",
+                                  wanted, samples, *prepared.theory.lookups);
+}
+
+/// A walk that takes more lookups than the bound is an error of its cell, however long it took to come there.
+void refuse_endless(PreparedCell& prepared) {
+  static const Real most = Workspace().most_lookups;
+  if (prepared.theory.most_lookups > most)
+    prepared.reason = fmt::format(
+        "a sample is expected to take {:.3g} lookups; at most {:.3g} are allowed: the depth of the majorant "
+        "is that large; give a thinner medium or a tighter majorant",
+        prepared.theory.most_lookups, most);
+}
+
+}  // namespace
+
+void add_theory(std::vector<PreparedCell>& cells, const std::function<bool()>& stop) {
   std::map<const Scene*, std::vector<PreparedCell*>> by_scene;
   for (PreparedCell& prepared : cells) {
     const bool plain = prepared.cell->measurement == Measurement{};
-    if (prepared.reason.empty() && plain && prepared.kernel->states_theory()) by_scene[prepared.scene.get()].push_back(&prepared);
+    if (prepared.scene && prepared.reason.empty() && plain && prepared.kernel->states_theory())
+      by_scene[prepared.scene.get()].push_back(&prepared);
   }
-  tbb::parallel_for_each(by_scene.begin(), by_scene.end(), [](auto& entry) {
+  tbb::parallel_for_each(by_scene.begin(), by_scene.end(), [&](auto& entry) {
+    if (stop()) return;
     auto& [scene, members] = entry;
     std::vector<TheoryQuery> queries;
     for (const PreparedCell* member : members)
-      queries.push_back({member->kernel.get(), member->cell->quantity, member->range, &member->targets});
-    const std::vector<CellTheory> theory = compute_theory(*scene, queries);
-    for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
+      queries.push_back({member->kernel.get(), member->cell->quantity, member->range, &member->targets, &member->cell->name});
+    const std::string failure = tracker_failure([&] {
+      const std::vector<CellTheory> theory = compute_theory(*scene, queries);
+      for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
+    });
+    // One of them threw: each by itself shows which.
+    for (std::size_t i = 0; i < members.size() && !failure.empty(); ++i)
+      members[i]->reason = members[i]->failure =
+          tracker_failure([&] { members[i]->theory = compute_theory(*scene, {queries[i]})[0]; });
   });
+  if (stop()) return;
   for (PreparedCell& prepared : cells) {
-    if (!prepared.cell->equal_lookups || !prepared.reason.empty()) continue;
-    if (!prepared.theory.lookups || !(*prepared.theory.lookups > 0))
-      prepared.reason = "equal_lookups needs an estimator and medium with known expected lookups above 0";
-    else
-      prepared.samples_per_ray = std::max<std::uint64_t>(
-          1, static_cast<std::uint64_t>(std::llround(*prepared.cell->equal_lookups / *prepared.theory.lookups)));
+    if (!prepared.reason.empty()) continue;
+    if (prepared.cell->equal_lookups) equalise(prepared, *prepared.cell->equal_lookups);
+    if (prepared.reason.empty()) refuse_endless(prepared);
   }
 }
 

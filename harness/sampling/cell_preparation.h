@@ -11,13 +11,13 @@
 
 namespace nullmark {
 
-/// A cell and everything needed to sample it; `reason` is set if it cannot run.
+/// A cell and everything needed to sample it; `reason` is set if it cannot run, `failure` if its tracker threw.
 struct PreparedCell {
   const Cell* cell = nullptr;
   std::size_t index = 0;
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const Kernel> kernel;
-  std::string reason;
+  std::string reason, failure;
   std::vector<std::string> effects;  ///< of a radiance kernel
   bool takes_part = true;            ///< false: flights are closed forms, and the estimator is not used
   Targets targets;
@@ -40,14 +40,19 @@ class CellPreparer {
   explicit CellPreparer(const Plan& plan) : plan_(plan) {}
 
   /// Prepares a cell by its index in the plan, without its theory.  Throws ParameterError (with a JSON pointer as `parameter`)
-  /// for specifications that do not fit their medium.
+  /// for specifications that do not fit their medium.  What else a tracker throws is the cell's `failure`.
   PreparedCell prepare(std::size_t index);
 
+  /// Hash of a medium of the plan and of its data, as records tell it; empty where its data are missing.
+  std::string medium_hash(std::size_t medium);
+
  private:
+  void add_kernel(PreparedCell& prepared);
   void add_light(PreparedCell& prepared, const EstimatorSource& source) const;
   std::string why_not(const Cell& cell, const Scene& scene, const Kernel* made);
   Real deepest_majorant(const Scene& scene);
   std::shared_ptr<const Scene> scene(const Cell& cell);
+  std::shared_ptr<const BuiltMedium> medium(std::size_t index);
 
   const Plan& plan_;
   std::map<std::size_t, std::string> missing_;
@@ -61,11 +66,20 @@ class CellPreparer {
   std::map<const Scene*, Real> deepest_;  ///< largest majorant depth of a ray, if it was needed
 };
 
+/// A cell of which nothing is built yet.
+PreparedCell unprepared(const Plan& plan, std::size_t index);
+
 /// Prepares the cells of a plan for whose index `wanted` is true.
-std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted);
+/// Once `stop` returns true, those that are left are not prepared: they have neither a scene nor a reason.
+std::vector<PreparedCell> prepare_all(
+    CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted,
+    const std::function<bool()>& stop = [] { return false; });
 
 /// Adds theory to all cells that can run, scene by scene.  Cells with a measurement get none, because it changes the law of the
-/// samples.  With equal_lookups, the number of samples follows from the theory.
-void add_theory(std::vector<PreparedCell>& cells);
+/// samples.  With equal_lookups, the number of samples follows from the theory.  A cell whose tracker throws has a `failure`.
+/// A cell has a `reason` where a sample can be expected to exceed the bound on its lookups, and where no count holds its samples.
+/// Once `stop` returns true, the theory of scenes that are left is not computed.
+void add_theory(
+    std::vector<PreparedCell>& cells, const std::function<bool()>& stop = [] { return false; });
 
 }  // namespace nullmark

@@ -9,6 +9,7 @@
 #include <map>
 #include <numeric>
 
+#include "harness/model/in_flight.h"
 #include "harness/statistics/double8.h"
 
 namespace nullmark {
@@ -360,6 +361,7 @@ std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const K
   std::atomic<std::size_t> done = 0;
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t at) {
     if (stops()) return;
+    const InFlight named(cell.name);
     sampler.sample(chunks[at], scratch.local(), parts[at], stops);
     progress(static_cast<double>(++done) / static_cast<double>(chunks.size()));
   });

@@ -104,6 +104,8 @@ BuiltMedium build_medium(const MediumSpec& spec) {
   return built;
 }
 
+std::string hash_text(const BuiltMedium& medium) { return fmt::format("{:016x}", medium.hash); }
+
 BuiltMajorant build_majorant(const Component& spec, const BuiltMedium& medium) {
   const auto source = make_majorant(spec);
   const auto start = std::chrono::steady_clock::now();

@@ -23,6 +23,9 @@ struct BuiltMedium {
 /// One value for all channels or one each; none: 0.  Throws ParameterError that names `what` if the number does not fit.
 Spectrum per_channel(const std::vector<Real>& values, int channels, const char* what);
 
+/// Its hash as records tell it, 16 hexadecimal digits.
+std::string hash_text(const BuiltMedium& medium);
+
 /// Builds a specification: the field, times its spectrum or one per channel.  Throws ParameterError or MissingData.
 BuiltMedium build_medium(const MediumSpec& spec);
 

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "harness/model/in_flight.h"
+
 namespace nullmark {
 
 RayProfile make_profile(const Medium& medium, const Ray& local, const SegmentBuffer& buffer) {
@@ -71,6 +73,8 @@ RayTheories::RayTheories(const Scene& scene, const std::vector<TheoryQuery>& que
       std::optional<RayProfile> profile;
       for (std::size_t k = 0; k < queries.size(); ++k) {
         const Kernel& kernel = *queries[k].kernel;
+        std::optional<InFlight> named;
+        if (queries[k].name) named.emplace(*queries[k].name);
         scene.context(ray, kernel, mine.context);
         if (!profile) {
           profile.emplace(make_profile(medium, scene.rays->local[ray], mine.context.segments));
@@ -98,6 +102,7 @@ void state_lookups(CellTheory& cell, const RayTheories& theories, std::size_t k)
     all_lookups = all_lookups && finite(theory.lookups);
     heavy = heavy || (theory.lookups_variance && *theory.lookups_variance == kInfinity);
     all_spreads = all_spreads && finite(theory.lookups_variance);
+    cell.most_lookups = std::max(cell.most_lookups, theory.lookups.value_or(0));
     lookups += cell.ray_lookups[ray] = theory.lookups.value_or(0);
     cell.ray_lookups_variance[ray] = theory.lookups_variance.value_or(0);
   }

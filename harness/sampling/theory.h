@@ -14,6 +14,7 @@ struct CellTheory {
   std::vector<std::optional<Real>> squared_bias;  ///< per output, mean over rays of (mean - reference)^2
   std::vector<std::optional<Real>> bias;
   std::optional<Real> lookups;  ///< averaged over rays
+  Real most_lookups = 0;        ///< expected of a sample of the ray with most; may be infinite; 0 where none are stated
   Real majorant_depth = 0;      ///< averaged over rays: an estimate of the lookups if none are stated
   bool unit_weights = false;    ///< for a free path: its weight is always 1
   /// Per ray and output; empty unless known for all: variance of a sample; the estimator's own mean minus the target.
@@ -28,6 +29,7 @@ struct TheoryQuery {
   Quantity quantity = Quantity::transmittance;
   SampleRange range = SampleRange::any_sign;
   const Targets* targets = nullptr;
+  const std::string* name = nullptr;  ///< of the cell, for messages; must outlive the computation
 };
 std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<TheoryQuery>& queries);
 

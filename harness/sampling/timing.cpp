@@ -110,6 +110,7 @@ struct Interrupted {};
 /// Samples a cell's rays over and over; every iteration takes new samples, so that no branch pattern is learnt by heart.
 void run_cell(benchmark::State& state, const TimedCell& timed, const std::vector<std::size_t>& rays, std::uint64_t samples,
               const std::function<bool()>& stop) {
+  const InFlight named(timed.cell->name);
   const std::uint64_t key = stream_key(*timed.cell, *timed.scene->medium);
   const Medium& medium = *timed.scene->medium->medium;
   const auto workspace = timed.kernel->workspace();

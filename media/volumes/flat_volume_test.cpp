@@ -169,7 +169,9 @@ TEST(FlatVolume, MessagesAreOneLineOfPlainText) {
   FlatHeader header;
   header.magic = FlatHeader::kMagic;
   header.kind = FlatHeader::Kind::bad_grid;
-  EXPECT_EQ(error_of(Example::raw(header) + "a\nb\x1b\xff\""), "grid: f.vdb: grid \"density\": a?b??\"");
+  std::string unprintable = Example::raw(header);
+  unprintable += "a\nb\x1b\xff\"";
+  EXPECT_EQ(error_of(unprintable), "grid: f.vdb: grid \"density\": a?b??\"");
   header.kind = FlatHeader::Kind::bad_file;
   EXPECT_LT(error_of(Example::raw(header) + std::string(100'000, 'x')).size(), 3000u);
 }

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+#include <string>
+
+namespace nullmark {
+
+/// What `f` threw, as one line; empty if nothing.  Exceptions that are `Passed` are thrown on: they are of the harness.
+template <class... Passed, class F>
+std::string failure_of(F&& f) {
+  std::string failure;
+  try {
+    f();
+  } catch (const std::exception& error) {
+    if ((dynamic_cast<const Passed*>(&error) || ...)) throw;
+    failure = fmt::format("the tracker threw: {}", error.what());
+  } catch (...) {
+    failure = "the tracker threw what is no std::exception";
+  }
+  std::replace(failure.begin(), failure.end(), '\n', ' ');
+  return failure;
+}
+
+}  // namespace nullmark
