@@ -5,6 +5,7 @@
 #include "harness/cli/commands.h"
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
+#include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/performance_gate/baseline.h"
 #include "harness/performance_gate/report.h"
@@ -32,7 +33,7 @@ ExitCode without_baseline(const GateCommand& command, const Counts& fresh, const
   report.after = fresh.source;
   report.missing = {remedy};
   write_files(command, report);
-  fmt::print(stderr, "nullmark: {}\n", remedy);
+  notice("nullmark: {}\n", remedy);
   return report.exit();
 }
 

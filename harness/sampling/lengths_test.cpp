@@ -17,7 +17,7 @@ bool fails(const VerdictRecord& verdict) {
 
 /// Wherever the sweep crosses a procedural medium by ratio tracking, a ratio tracker that forgets the length fails.
 TEST(Lengths, TheSweepFailsWhoForgetsThem) {
-  Plan plan = read_configs(load_configs({std::string(NULLMARK_SOURCE_DIR) + "/configs/unbiasedness.json"}));
+  Plan plan = read_configs(load_configs({NULLMARK_SOURCE_DIR "/configs/unbiasedness.json"}));
   std::set<std::pair<std::size_t, std::size_t>> taken;  // medium and rays, each with its tightest majorant
   std::vector<bool> wanted;
   for (Cell& cell : plan.cells) {
