@@ -16,12 +16,13 @@ struct RatePiece {
   T begin, end, rate, inverse_rate, depth_before, depth_after;
 };
 
-/// A piecewise constant sampling rate along a ray, 1/length, with its running depth int_begin^t rate.  Behind the last piece lies
-/// one of rate 0 and no length, so that a walk always has a piece to ask: on a ray that misses there is no other.
+/// A piecewise constant sampling rate along a ray, 1/length, with its running depth int_begin^t rate.  A ray that misses has no
+/// piece, but its walk may ask for the rate: piece 0 is then of rate 0 and no length.
 class Rates {
  public:
   void start(Real begin, Crossing crossing = Crossing::carry) {
     pieces_.assign(1, {begin, begin, 0, kInfinity, 0, 0});
+    empty_ = true;
     single_.clear();
     begin_ = begin;
     crossing_ = crossing;
@@ -32,11 +33,12 @@ class Rates {
   void append(Real end, Real rate) {
     const Real from = this->end(), before = total_depth_;
     if (rate > 0) total_depth_ += rate * (end - from);
-    pieces_.back() = {from, end, rate, 1 / rate, before, total_depth_};
-    pieces_.push_back({end, end, 0, kInfinity, total_depth_, total_depth_});
+    if (empty_) pieces_.clear();
+    empty_ = false;
+    pieces_.push_back({from, end, rate, 1 / rate, before, total_depth_});
   }
 
-  std::size_t size() const { return pieces_.size() - 1; }
+  std::size_t size() const { return empty_ ? 0 : pieces_.size(); }
   Crossing crossing() const { return crossing_; }
   Real begin() const { return begin_; }
   Real end() const { return pieces_.back().end; }
@@ -52,7 +54,7 @@ class Rates {
     return std::min(piece.end, piece.begin + (depth - piece.depth_before) * piece.inverse_rate);
   }
 
-  /// All pieces, for lanes; those in single precision are made when first asked for.
+  /// All pieces, at least one, for lanes; those in single precision are made when first asked for.
   template <class T>
   const RatePiece<T>* pieces() const {
     if constexpr (std::is_same_v<T, Real>) {
@@ -71,6 +73,7 @@ class Rates {
   std::vector<RatePiece<Real>> pieces_{{0, 0, 0, kInfinity, 0, 0}};
   mutable std::vector<RatePiece<float>> single_;
   Real begin_ = 0, total_depth_ = 0;
+  bool empty_ = true;
   Crossing crossing_ = Crossing::carry;
 };
 
@@ -138,8 +141,8 @@ class Flight {
   /// Cuts a flight to `depth` at the end of its cell, and others after it, until one ends inside its cell or the ray is left.
   [[gnu::noinline]] bool rewind(Real depth, auto& rng) {
     for (;;) {
-      while (piece_ < rates_->size() && !(depth_ < rates_->depth_after(piece_))) ++piece_;
-      if (piece_ == rates_->size()) break;
+      while (piece_ + 1 < rates_->size() && !(depth_ < rates_->depth_after(piece_))) ++piece_;
+      if (!(depth_ < rates_->depth_after(piece_))) break;
       if (depth < rates_->depth_after(piece_)) return advance_to(depth);
       depth_ = rates_->depth_after(piece_);
       if (!(depth_ < rates_->total_depth())) break;

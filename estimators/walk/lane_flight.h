@@ -14,7 +14,7 @@ class LaneRates {
 
   LaneRates() = default;
   explicit LaneRates(const Rates& rates)
-      : pieces_(rates.size() > 0 ? rates.pieces<T>() : &kVacuum),
+      : pieces_(rates.pieces<T>()),
         last_(rates.size() > 0 ? static_cast<Number>(rates.size()) - 1 : 0),
         begin_(static_cast<T>(rates.begin())),
         end_(static_cast<T>(rates.end())),
@@ -31,7 +31,6 @@ class LaneRates {
   template <class, std::size_t, bool>
   friend class LaneFlight;
   using Number = typename Index::Number;
-  static constexpr RatePiece<T> kVacuum{};
 
   template <bool several, auto member>
   [[gnu::always_inline]] Pack of(Index piece) const {
@@ -39,7 +38,7 @@ class LaneRates {
     return !several || last_ == 0 ? Pack(pieces_->*member) : piece.template gathered<6>(&(pieces_->*member));
   }
 
-  const RatePiece<T>* pieces_ = &kVacuum;
+  const RatePiece<T>* pieces_ = nullptr;
   Number last_ = 0;
   T begin_ = 0, end_ = 0, total_ = 0;
   bool rewinds_ = false;

@@ -117,8 +117,8 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     std::size_t dead = 0;   ///< lanes of ended walks
   };
 
-  /// One block of samples in progress.  Code that runs once per block is not inlined, so the code of a step does not depend on
-  /// what else the file holds.
+  /// One block of samples in progress.  Code that runs once per block is not inlined, and all of a step is, so the code of a step
+  /// does not depend on what else the file holds.
   struct Run {
     const LaneKernel& kernel;
     State& state;
@@ -139,7 +139,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     /// Coordinates along which the ray does not move keep the value from the begin of the block.
     bool moves_along(std::size_t axis) const { return direction[axis] != 0; }
 
-    void block(std::size_t count) {
+    [[gnu::flatten]] void block(std::size_t count) {
       Tally tally{.walks = count};
       std::size_t lanes = (count + N - 1) / N * N;
       for (std::size_t axis = 0; axis < 3; ++axis)
@@ -167,7 +167,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       if constexpr (!Traits::kIgnoresMajorant) counters.null_collisions += tally.lookups - tally.real;
     }
 
-    [[gnu::noinline]] void set_out(std::size_t k, Mask there, Tally& tally) {
+    [[gnu::noinline, gnu::flatten]] void set_out(std::size_t k, Mask there, Tally& tally) {
       Walks walks;
       walks.stream = Streams::seeded({first.key, first.ray, first.sample + k});
       walks.sample = Index::counting_from(static_cast<typename Index::Number>(k));
