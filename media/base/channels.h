@@ -98,7 +98,7 @@ class PerChannel final : public Medium {
   }
 
   /// One channel at a point.
-  Real extinction(int channel, const Vec3& point) const {
+  Real channel_extinction(int channel, const Vec3& point) const {
     const auto c = static_cast<std::size_t>(channel);
     const Vec3 p = point.cwiseMax(bounds_.lo).cwiseMin(bounds_.hi);
     if ((p.array() < boxes_[c].lo.array()).any() || (p.array() > boxes_[c].hi.array()).any()) return 0;

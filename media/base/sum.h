@@ -41,7 +41,7 @@ class Sum final : public Medium {
 
   int components() const override { return parts_.channels(); }
   Spectrum component_maxima(const Box& box) const override { return parts_.extrema(box).maximum; }
-  Real component_extinction(int component, const Vec3& point) const override { return parts_.extinction(component, point); }
+  Real component_extinction(int component, const Vec3& point) const override { return parts_.channel_extinction(component, point); }
 
  private:
   static constexpr std::size_t kBlock = 64;
