@@ -76,7 +76,9 @@ TEST_F(Endless, MoreSamplesThanCanBeCountedAreRefused) {
 
 /// A tracker that answers nothing, in a sample and in its theory.
 TEST_F(Endless, SignalsEndWhatDoesNotAnswer) {
-  for (const auto& [signal, code] : {std::pair("INT", ExitCode::interrupted), std::pair("TERM", ExitCode::terminated)}) {
+  constexpr const char* kTwiceAsTimeoutDoes = "TERM $!; sleep .05; kill -TERM";
+  for (const auto& [signal, code] : {std::pair("INT", ExitCode::interrupted), std::pair("TERM", ExitCode::terminated),
+                                     std::pair(kTwiceAsTimeoutDoes, ExitCode::terminated)}) {
     std::filesystem::remove(folder_ / "r.json");
     configure(R"({"type":"faulty","fault":"sleeps"})");
     const auto [exit, seconds] = ended("--threads 2", signal);
