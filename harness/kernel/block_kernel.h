@@ -5,9 +5,9 @@
 #include <type_traits>
 
 #include "harness/kernel/kernel.h"
-#include "harness/kernel/walker.h"
+#include "harness/kernel/majorant_audit.h"
+#include "harness/kernel/ray_preparation.h"
 #include "media/base/elementary.h"
-#include "media/base/inversion.h"
 
 namespace nullmark {
 
@@ -29,6 +29,7 @@ class BlockKernel : public Kernel {
 
   struct State : Workspace {
     RayData ray;
+    Ray local;
     std::array<Walk, kBlock> walk;
     std::array<Flight, kBlock> flight;
     std::array<Rng, kBlock> rng;
@@ -38,7 +39,6 @@ class BlockKernel : public Kernel {
     std::vector<std::uint32_t> marked;  ///< for a profile, per walk: number of marks passed
   };
 
- private:
  public:
   BlockKernel(const E& estimator, int channels) : estimator_(estimator), channels_(channels) {}
 
@@ -66,25 +66,16 @@ class BlockKernel : public Kernel {
   std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
 
   void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const PreparedRay& context) const override {
-    RayData& ray = static_cast<State&>(workspace).ray;
-    ray.begin = context.world.begin;
-    ray.end = context.world.end;
-    ray.channels = channels_;
+    State& state = static_cast<State&>(workspace);
+    RayData& ray = state.ray;
+    state.local = context.local;
     ray.bounds.segments.assign(context.segments.segments.begin(), context.segments.segments.end());
     ray.bounds.crossing = context.segments.crossing;
-    ray.medium = extrema;
-    ray.majorant.start(ray.begin, ray.bounds.crossing);
-    for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
     ray.exact_depth.reset();
     if (context.exact_depth) ray.exact_depth = load<Value>(context.exact_depth->data(), channels_);
     ray.knots.assign(context.knots.begin(), context.knots.end());
-    ray.degree = medium.polynomial_degree();
-    ray.entry = context.world.at(context.world.begin);
-    if constexpr (Traits::kNeedsInversion)
-      ray.distance_at_depth = [&medium, local = context.local](Real depth) { return distance_at_depth(medium, local, depth); };
-    if constexpr (Traits::kNeedsShares) detail::prepare_shares(ray, medium, context.local);
-    ray.albedo = context.albedo.size() > 0 ? load<Value>(context.albedo.data(), channels_) : ray.value(0);
-    ray.throughput = ray.value(1);
+    prepare_ray<Traits>(ray, medium, extrema, context.world, state.local, channels_);
+    if (context.albedo.size() > 0) ray.albedo = load<Value>(context.albedo.data(), channels_);
     if constexpr (Traits::kPrepare) estimator_.prepare(ray);
   }
 
@@ -214,7 +205,8 @@ class BlockKernel : public Kernel {
           walk.extinction.insert(walk.extinction.end(), &state.extinction[a * channels],
                                  &state.extinction[a * channels] + channels);
         }
-        audit(ray, state.flight[k], extinction, counters);
+        if constexpr (!Traits::kIgnoresMajorant)
+          audit_majorant(largest(extinction), ray.majorant.rate(state.flight[k].piece()), counters);
         estimator_.consume(state.walk[k], ray, state.flight[k], extinction, state.rng[k]);
         if constexpr (recorded) state.recording->walks[recorded_before + k].steps.back().draws = state.rng[k].draws();
         if (++lookups[k] == state.most_lookups) {
@@ -296,15 +288,6 @@ class BlockKernel : public Kernel {
     if constexpr (Traits::kIgnoresMajorant) return 0;
     if constexpr (Traits::kRealCollisions) return lookups - static_cast<std::uint64_t>(estimator_.real_collisions(walk, ray));
     return lookups;
-  }
-
-  void audit(const RayData& ray, const Flight& at, const Value& extinction, Counters& counters) const {
-    if constexpr (Traits::kIgnoresMajorant) return;
-    const Real bound = ray.majorant.rate(at.piece()), most = largest(extinction);
-    if (exceeds(most, bound)) {
-      ++counters.violations;
-      counters.largest_violation = std::max(counters.largest_violation, most / bound);
-    }
   }
 
   E estimator_;

@@ -4,6 +4,7 @@
 
 #include "harness/kernel/block_kernel.h"
 #include "harness/kernel/lane_kernel.h"
+#include "harness/kernel/walker.h"
 
 namespace nullmark {
 

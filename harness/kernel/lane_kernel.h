@@ -112,7 +112,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
  private:
   /// Counts of a block.
   struct Tally {
-    std::uint64_t draws = 0, lookups = 0, real = 0, violations = 0;
+    std::uint64_t draws = 0, lookups = 0, real = 0;
     std::size_t walks = 0;  ///< in the first lanes, including walks that ended since the last compaction
     std::size_t dead = 0;   ///< lanes of ended walks
   };
@@ -163,7 +163,6 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       }
       counters.draws += tally.draws;
       counters.lookups += tally.lookups;
-      counters.violations += tally.violations;
       if constexpr (!Traits::kIgnoresMajorant) counters.null_collisions += tally.lookups - tally.real;
     }
 
@@ -193,7 +192,8 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       LaneFlight<T, N, several> flight(rates, walks.place);
       Streams rng(walks.stream, alive);
       const Pack extinction = Pack::load(&state.extinction[k]);
-      audit<several>(flight.piece(), extinction, alive, tally);
+      if constexpr (!Traits::kIgnoresMajorant)
+        audit_majorant(extinction, majorant.template rate<several>(flight.piece()), alive, counters);
       kernel.estimator_.consume(walks.walk, state.ray, flight, extinction, rng);
       propose(k, walks, alive, flight, rng, step, tally);
     }
@@ -223,20 +223,6 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       if constexpr (requires { kernel.estimator_.optical_depth(walks.walk, state.ray); })
         if (quantity == Quantity::optical_depth) return kernel.estimator_.optical_depth(walks.walk, state.ray);
       return kernel.estimator_.result(walks.walk, state.ray);
-    }
-
-    template <bool several>
-    [[gnu::always_inline]] void audit(Index piece, Pack extinction, Mask alive, Tally& tally) {
-      if constexpr (Traits::kIgnoresMajorant) return;
-      const Pack bound = majorant.template rate<several>(piece);
-      Mask beyond = extinction > bound * Pack(1 + kBoundRounding<T>);
-      if (none(beyond)) return;
-      beyond = beyond & alive;
-      tally.violations += count(beyond);
-      const Pack excess = select(beyond, extinction / bound, Pack(0));
-      T x[N];
-      excess.store(x);
-      counters.largest_violation = std::max<Real>(counters.largest_violation, *std::max_element(x, x + N));
     }
 
     /// Writes out the results of ended walks and compacts the others; returns the number of lanes that these take.

@@ -6,26 +6,12 @@
 
 #include "harness/kernel/estimator_traits.h"
 #include "harness/kernel/kernel.h"
+#include "harness/kernel/majorant_audit.h"
 #include "harness/kernel/optical_depth.h"
+#include "harness/kernel/ray_preparation.h"
 #include "media/majorants/majorant.h"
 
 namespace nullmark {
-
-namespace detail {
-
-/// Probabilities of the components of a sum in every segment, proportional to their bounds there.
-template <class Along>
-void prepare_shares(Along& ray, const Medium& medium, const Ray& local) {
-  ray.shares.clear();
-  for (const Segment& segment : ray.bounds.segments) {
-    const Vec3 a = local.at(segment.begin), b = local.at(segment.end);
-    Spectrum bounds = medium.component_maxima({a.cwiseMin(b), a.cwiseMax(b)});
-    if (!(bounds.sum() > 0)) bounds.setOnes();
-    ray.shares.push_back(bounds / bounds.sum());
-  }
-}
-
-}  // namespace detail
 
 /// Data that all walks of a scene share.
 template <class Value>
@@ -134,29 +120,16 @@ class EstimatorWalker final : public Walker<Value> {
   void begin(WalkMemory& memory, const PathScene<Value>& path_scene, const Ray& world, const Ray& local) const override {
     State& state = static_cast<State&>(memory);
     Along& ray = state.ray;
-    ray.begin = world.begin;
-    ray.end = world.end;
-    ray.channels = path_scene.channels;
+    state.local = local;
     path_scene.majorant->segments(world, local, ray.bounds);
-    ray.medium = *path_scene.extrema;
-    ray.majorant.start(ray.begin, ray.bounds.crossing);
-    for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
     ray.exact_depth.reset();
     if (needs_optical_depth())
       ray.exact_depth = load<Value>(optical_depth(*path_scene.medium, local).depth.data(), path_scene.channels);
     ray.knots.clear();
     if (needs_knots()) sorted_knots(*path_scene.medium, local, ray.knots);
-    if constexpr (Traits::kNeedsInversion)
-      // Two pointers fit std::function's own memory; a ray would be allocated for every leg of a path.
-      ray.distance_at_depth = [medium = path_scene.medium, along = &state.local](Real depth) {
-        return distance_at_depth(*medium, *along, depth);
-      };
-    if constexpr (Traits::kNeedsShares) detail::prepare_shares(ray, *path_scene.medium, local);
-    ray.degree = path_scene.medium->polynomial_degree();
-    ray.entry = world.at(world.begin);
+    prepare_ray<Traits>(ray, *path_scene.medium, *path_scene.extrema, world, state.local, path_scene.channels);
     ray.albedo = path_scene.albedo;
     ray.draws_absorption = path_scene.draws_absorption;
-    state.local = local;
     if constexpr (Traits::kPrepare) estimator_.prepare(ray);
   }
 
@@ -194,7 +167,8 @@ class EstimatorWalker final : public Walker<Value> {
       }
       ++lookups;
       const Value extinction = load<Value>(state.extinction.data(), path_scene.channels);
-      audit(state.ray, flight, extinction, counters);
+      if constexpr (!Traits::kIgnoresMajorant)
+        audit_majorant(largest(extinction), state.ray.majorant.rate(flight.piece()), counters);
       estimator_.consume(state.walk, state.ray, flight, extinction, rng);
       budget.spend();
     }
@@ -205,16 +179,6 @@ class EstimatorWalker final : public Walker<Value> {
         counters.null_collisions -= static_cast<std::uint64_t>(estimator_.real_collisions(state.walk, state.ray));
     }
     return flight;
-  }
-
-  static void audit(const Along& ray, const Flight& at, const Value& extinction, Counters& counters) {
-    if constexpr (!Traits::kIgnoresMajorant) {
-      const Real bound = ray.majorant.rate(at.piece()), most = largest(extinction);
-      if (exceeds(most, bound)) {
-        ++counters.violations;
-        counters.largest_violation = std::max(counters.largest_violation, most / bound);
-      }
-    }
   }
 
   E estimator_;

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "harness/kernel/block_kernel.h"
+#include "harness/kernel/optical_depth.h"
 #include "media/base/medium.h"
 
 namespace nullmark {
@@ -25,29 +26,14 @@ class HandWalked {
       : estimator(std::move(tracker)), medium_(std::move(medium)) {
     const Vec3 middle = (medium_->bounds().lo + medium_->bounds().hi) / 2;
     line_ = {{0, middle.y(), middle.z()}, Vec3::UnitX(), 0, length};
-    ray.begin = 0;
-    ray.end = length;
-    ray.channels = medium_->channels();
-    ray.medium = medium_->extrema(medium_->bounds());
     for (int i = 0; i < pieces; ++i) {
       const Real a = length * i / pieces, b = i + 1 == pieces ? length : length * (i + 1) / pieces;
       const Extrema bounds = medium_->extrema({line_.at(a), line_.at(b)});
       ray.bounds.segments.push_back({a, b, bounds.maximum.maxCoeff() * looseness, bounds});
     }
-    ray.majorant.start(0);
-    for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
-    if (const auto depth = medium_->optical_depth(line_)) ray.exact_depth = load<Value>(depth->data(), ray.channels);
-    medium_->knots(line_, ray.knots);
-    ray.knots.insert(ray.knots.end(), {Real{0}, length});
-    std::sort(ray.knots.begin(), ray.knots.end());
-    ray.degree = medium_->polynomial_degree();
-    ray.distance_at_depth = [this](Real depth) { return distance_at_depth(*medium_, line_, depth); };
-    for (const Segment& segment : ray.bounds.segments) {
-      const Spectrum bounds = medium_->component_maxima({line_.at(segment.begin), line_.at(segment.end)});
-      ray.shares.push_back(bounds / bounds.sum());
-    }
-    ray.albedo = ray.value(0);
-    ray.throughput = ray.value(1);
+    if (const auto depth = medium_->optical_depth(line_)) ray.exact_depth = load<Value>(depth->data(), medium_->channels());
+    sorted_knots(*medium_, line_, ray.knots);
+    prepare_ray<EstimatorTraits<E, Value>>(ray, *medium_, medium_->extrema(medium_->bounds()), line_, line_, medium_->channels());
     prepare();
   }
   HandWalked(const HandWalked&) = delete;
