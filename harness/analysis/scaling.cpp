@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
+#include <boost/math/statistics/linear_regression.hpp>
+#include <boost/math/statistics/univariate_statistics.hpp>
 #include <cmath>
 #include <functional>
+#include <set>
 
 #include "harness/config/cell_names.h"
 #include "harness/io/transport_json.h"
+#include "harness/model/metrics.h"
 #include "harness/model/names.h"
 #include "harness/registry/components.h"
 
@@ -60,27 +64,18 @@ std::map<std::string, Real> numeric_parameters(const CellRecord& record) {
 }
 
 std::optional<Interval> power_law(const std::vector<std::pair<Real, Real>>& points) {
-  const std::size_t n = points.size();
-  if (n < 3) return std::nullopt;
-  Real x_mean = 0, y_mean = 0;
-  for (const auto& [x, y] : points) {
-    x_mean += std::log(x) / static_cast<Real>(n);
-    y_mean += std::log(y) / static_cast<Real>(n);
+  std::vector<Real> x, y;
+  for (const auto& [work, cost] : points) {
+    x.push_back(std::log(work));
+    y.push_back(std::log(cost));
   }
-  Real xx = 0, xy = 0;
-  for (const auto& [x, y] : points) {
-    xx += (std::log(x) - x_mean) * (std::log(x) - x_mean);
-    xy += (std::log(x) - x_mean) * (std::log(y) - y_mean);
-  }
-  if (!(xx > 0)) return std::nullopt;
-  const Real slope = xy / xx;
+  if (x.size() < 3 || std::set<Real>(x.begin(), x.end()).size() < 2) return std::nullopt;
+  const auto [intercept, slope] = boost::math::statistics::simple_ordinary_least_squares(x, y);
   Real squares = 0;
-  for (const auto& [x, y] : points) {
-    const Real residual = std::log(y) - y_mean - slope * (std::log(x) - x_mean);
-    squares += residual * residual;
-  }
-  const auto freedom = static_cast<Real>(n - 2);
-  const Real half = boost::math::quantile(boost::math::students_t(freedom), 0.975) * std::sqrt(squares / freedom / xx);
+  for (std::size_t i = 0; i < x.size(); ++i) squares += std::pow(y[i] - intercept - slope * x[i], 2);
+  const auto freedom = static_cast<Real>(x.size() - 2);
+  const Real scatter = std::sqrt(squares / freedom / (boost::math::statistics::variance(x) * static_cast<Real>(x.size())));
+  const Real half = boost::math::quantile(boost::math::students_t(freedom), 0.975) * scatter;
   return Interval{slope, slope - half, slope + half};
 }
 
@@ -124,6 +119,7 @@ std::vector<ScalingSeries> scaling_series(const RunRecord& run) {
     series.time = exponent(series, 0, time);
     series.time_upper = exponent(series, series.cells.size() / 2, time);
     series.lookups = exponent(series, 0, [](const CellRecord& record) { return record.lookups_per_sample; });
+    series.variance = exponent(series, 0, [](const CellRecord& record) { return metric(record, "relative_variance"); });
     all.push_back(std::move(series));
   }
   return all;

@@ -24,7 +24,7 @@ struct ScalingSeries {
   std::string tracker, rest;              ///< the tracker, and everything else that the cells share
   std::vector<const CellRecord*> cells;   ///< by ascending parameter, three or more
   std::vector<Real> x;                    ///< the parameter, > 0
-  std::optional<Interval> time, lookups;  ///< exponents of ns per sample and of lookups per sample
+  std::optional<Interval> time, lookups, variance;  ///< exponents of ns, of lookups and of relative variance per sample
   std::optional<Interval> time_upper;     ///< the same over the upper half of the points, if it has three
 };
 

@@ -121,6 +121,22 @@ Interval mean_square_error(const Cost& cost, std::uint64_t samples) {
   return {error(cost.variance.value, floor.value), error(cost.variance.low, floor.low), error(cost.variance.high, floor.high)};
 }
 
+const char* to_string(BreakEven::Kind kind) {
+  switch (kind) {
+    case BreakEven::Kind::first_sample:
+      return "the first unbiased sample";
+    case BreakEven::Kind::never_cheaper:
+      return "never cheaper";
+    case BreakEven::Kind::no_floor_seen:
+      return "no floor seen";
+    case BreakEven::Kind::exact:
+      return "exact but for rounding";
+    case BreakEven::Kind::at:
+      break;
+  }
+  return "at";
+}
+
 std::optional<BreakEven> break_even(const Cost& biased, const Cost& unbiased) {
   if (!biased.floor || !biased.variance_x_ns || !unbiased.variance_x_ns) return std::nullopt;
   constexpr Real kSeconds = 1e-9;

@@ -62,6 +62,10 @@ struct BreakEven {
   enum class Kind { at, first_sample, never_cheaper, no_floor_seen, exact } kind = Kind::at;  ///< exact: but for rounding
   Interval seconds, error;
 };
+
+/// Until when the biased estimator is cheaper than the unbiased one, in words; "at" for Kind::at.
+const char* to_string(BreakEven::Kind kind);
+
 /// Nothing if either has no time.
 std::optional<BreakEven> break_even(const Cost& biased, const Cost& unbiased);
 

@@ -45,18 +45,7 @@ std::string floor_shown(const RankedCell& ranked) {
 
 std::string break_even_shown(const RankedCell& ranked) {
   if (!ranked.break_even) return "";
-  switch (ranked.break_even->kind) {
-    case BreakEven::Kind::first_sample:
-      return "the first unbiased sample";
-    case BreakEven::Kind::never_cheaper:
-      return "never cheaper";
-    case BreakEven::Kind::no_floor_seen:
-      return "no floor seen";
-    case BreakEven::Kind::exact:
-      return "exact but for rounding";
-    case BreakEven::Kind::at:
-      break;
-  }
+  if (ranked.break_even->kind != BreakEven::Kind::at) return to_string(ranked.break_even->kind);
   return fmt::format("{} s, at {:.2g} %", shown(ranked.break_even->seconds), 100 * ranked.break_even->error.value);
 }
 

@@ -29,22 +29,6 @@ namespace {
 
 using Places = std::map<const CellRecord*, std::size_t>;
 
-const char* word(BreakEven::Kind kind) {
-  switch (kind) {
-    case BreakEven::Kind::first_sample:
-      return "cheaper only before the first unbiased sample";
-    case BreakEven::Kind::never_cheaper:
-      return "never cheaper";
-    case BreakEven::Kind::no_floor_seen:
-      return "no floor seen";
-    case BreakEven::Kind::exact:
-      return "exact but for rounding";
-    case BreakEven::Kind::at:
-      break;
-  }
-  return "at";
-}
-
 Json scene_json(const Comparison& comparison, const Places& places) {
   const auto cell = [&](std::size_t ranked) { return places.at(comparison.cells[ranked].record); };
   const auto cell_or_null = [&](const std::optional<std::size_t>& ranked) {
@@ -62,7 +46,7 @@ Json scene_json(const Comparison& comparison, const Places& places) {
     const bool at = ranked.break_even->kind == BreakEven::Kind::at;
     break_even.push_back({{"cell", cell(i)},
                           {"against", cell(*comparison.best_unbiased)},
-                          {"kind", word(ranked.break_even->kind)},
+                          {"kind", to_string(ranked.break_even->kind)},
                           {"seconds", at ? interval(ranked.break_even->seconds) : Json(nullptr)},
                           {"error", at ? interval(ranked.break_even->error) : Json(nullptr)}});
   }
@@ -168,7 +152,8 @@ Json scaling_json(const std::vector<RunRecord>& runs, const Places& places) {
         points.push_back({{"x", series.x[i]},
                           {"cell", places.at(&record)},
                           {"ns_per_sample", record.time ? interval(median_interval(record.time->repetition_ns)) : Json(nullptr)},
-                          {"lookups", number_or_null(record.lookups_per_sample)}});
+                          {"lookups", number_or_null(record.lookups_per_sample)},
+                          {"relative_variance", number_or_null(metric(record, "relative_variance"))}});
       }
       list.push_back({{"axis", series.axis},
                       {"estimator", series.tracker},
@@ -176,7 +161,8 @@ Json scaling_json(const std::vector<RunRecord>& runs, const Places& places) {
                       {"points", std::move(points)},
                       {"exponent", interval(series.time)},
                       {"exponent_upper", interval(series.time_upper)},
-                      {"exponent_lookups", interval(series.lookups)}});
+                      {"exponent_lookups", interval(series.lookups)},
+                      {"exponent_variance", interval(series.variance)}});
     }
   return list;
 }

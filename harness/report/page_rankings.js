@@ -17,7 +17,7 @@ function breakEvenText(scene, place) {
   const entry = scene.break_even.find(({ cell }) => cell === place);
   if (!entry) return "";
   if (entry.kind !== "at") return entry.kind;
-  return `cheaper above an error of ${formatPercent(entry.error?.value)} (${formatSeconds(entry.seconds?.value)})`;
+  return `${formatSeconds(entry.seconds?.value)}, at ${formatPercent(entry.error?.value)}`;
 }
 
 function estimatorCell(scene, entry, cell) {
@@ -37,7 +37,7 @@ const rankingColumns = [
   { title: "variance × ns", timed: true, of: (_, __, cell) => intervalText(cell.cost?.variance_x_ns) },
   { title: "variance × lookups", of: (_, __, cell) => intervalText(cell.cost?.variance_x_lookups) },
   { title: "floor of the error", of: (_, __, cell) => (floorText(cell) ? intervalText(cell.cost.floor, formatPercent) : "") },
-  { title: "against the best unbiased", timed: true, of: (scene, entry) => breakEvenText(scene, entry.cell) },
+  { title: "cheaper than the best unbiased until", timed: true, of: (scene, entry) => breakEvenText(scene, entry.cell) },
 ].filter(({ timed }) => anythingTimed || !timed);
 
 function rankingRow(scene, entry) {

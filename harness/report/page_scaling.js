@@ -1,8 +1,9 @@
-// Costs over swept parameters, and the power that they grow with.
+// Costs and variance over swept parameters, and the power that they grow with.
 
 const scalingViews = {
   ns_per_sample: { title: "ns a sample", exponent: "exponent", of: (point) => point.ns_per_sample },
   lookups: { title: "lookups a sample", exponent: "exponent_lookups", of: (point) => exactly(point.lookups) },
+  variance: { title: "variance / mean²", exponent: "exponent_variance", of: (point) => exactly(point.relative_variance) },
 };
 
 /** Series that differ in nothing but the estimator share a plot. */
@@ -39,7 +40,7 @@ function scalingTrace(series, view, theme) {
       series.estimator,
       `${series.axis}: ${formatNumber(point.x)}`,
       `${view.title}: ${formatInterval(costs[i])}`,
-      `cost grows with the power ${formatInterval(series[view.exponent])}`,
+      `exponent: ${formatInterval(series[view.exponent])}`,
     ])),
   };
 }
@@ -68,7 +69,7 @@ function scalingNumbers(group, view) {
 function scalingFigure(group, view) {
   return {
     title: `${view.title} over ${group.axis}: ${shortMedium(group.rest)}`,
-    caption: `Cost grows with the power: ${listed(group.series.map((series) => scalingLabel(series, view)), 6)}.`,
+    caption: `Exponent of ${view.title}: ${listed(group.series.map((series) => scalingLabel(series, view)), 6)}.`,
     height: 380,
     describe: (width, theme) => scalingPlot(group, view, width, theme),
     numbers: () => scalingNumbers(group, view),

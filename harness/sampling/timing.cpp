@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/statistics/univariate_statistics.hpp>
 #include <map>
 #include <set>
 
@@ -14,14 +15,9 @@
 namespace nullmark {
 namespace {
 
-constexpr std::size_t kRays = 64;  ///< at most this many, spread evenly over the cell's
+using boost::math::statistics::median, boost::math::statistics::median_absolute_deviation;
 
-Real median(std::vector<Real> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return (*middle + *std::max_element(values.begin(), middle)) / 2;
-}
+constexpr std::size_t kRays = 64;  ///< at most this many, spread evenly over the cell's
 
 std::vector<std::size_t> timed_rays(const BuiltRays& rays) {
   std::vector<std::size_t> hits, chosen;
@@ -95,13 +91,8 @@ std::vector<Real> sample_times(const std::vector<Repetition>& repetitions) {
   return ns;
 }
 
-BatchTime batch_time(std::uint64_t samples_per_traversal, const std::vector<Real>& ns) {
-  BatchTime batch{samples_per_traversal, median(ns), 0};
-  std::vector<Real> deviation;
-  deviation.reserve(ns.size());
-  for (const Real each : ns) deviation.push_back(std::abs(each - batch.ns_per_sample));
-  batch.mad = median(deviation);
-  return batch;
+BatchTime batch_time(std::uint64_t samples_per_traversal, std::vector<Real> ns) {
+  return {samples_per_traversal, median(ns), median_absolute_deviation(ns)};
 }
 
 /// Leaves Google Benchmark altogether: 1.7 aborts when a benchmark is skipped in one of several interleaved repetitions.
