@@ -209,7 +209,9 @@ class BlockKernel : public Kernel {
           audit_majorant(largest(extinction), ray.majorant.rate(state.flight[k].piece()), counters);
         estimator_.consume(state.walk[k], ray, state.flight[k], extinction, state.rng[k]);
         if constexpr (recorded) state.recording->walks[recorded_before + k].steps.back().draws = state.rng[k].draws();
-        if (++lookups[k] == state.most_lookups) {
+        bool overrun = ++lookups[k] == state.most_lookups;
+        if constexpr (recorded) overrun = overrun || ++state.recording->steps == Recording::kMostSteps;
+        if (overrun) {
           ++counters.overruns;
           active = 0;
         }

@@ -70,6 +70,10 @@ struct Recording {
   };
   std::vector<Walk> walks;
 
+  /// Steps of all walks together that memory allows; a block that takes more is aborted and counted as an overrun.
+  static constexpr std::uint64_t kMostSteps = 1u << 24;
+  std::uint64_t steps = 0;
+
   /// Adds n walks; reuses memory that `restart` kept.
   void add(std::size_t n) {
     for (; n > 0; --n) {
@@ -87,6 +91,7 @@ struct Recording {
       kept_.push_back({std::move(walk.steps), std::move(walk.extinction)});
     }
     walks.clear();
+    steps = 0;
   }
 
  private:

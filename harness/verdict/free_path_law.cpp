@@ -92,6 +92,7 @@ std::vector<LawRecord> free_path_laws(const Cell& cell, const Scene& scene, cons
       kernel.sample(*workspace, *scene.medium->medium, context, key, first_sample::kFreePaths + done,
                     std::min(kBatch, samples - done), cell.quantity, block, counters);
       workspace->recording = nullptr;
+      if (counters.overruns > 0) return {};
       for (const Recording::Walk& walk : recording.walks) {
         if (!is_collision(walk.end)) {
           ++histogram.count[kFreePathCells];

@@ -58,19 +58,26 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSam
 std::vector<LawRecord> laws_of(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,
                                std::span<const KeptSamples> kept, std::vector<std::string>& untested,
                                const std::function<bool()>& stop) {
+  constexpr const char* kTooLong = "walks take more lookups than a recording holds";
   std::vector<LawRecord> laws;
   const LawPolicy policy = prepared.cell->verdict.laws;
   const bool violates = prepared.needs_bound && !prepared.scene->bounding, judged = plan.against == "reference" && !violates;
-  if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !plan.undecidable.empty())))
-    laws = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range, prepared.theory,
-                     {.each = lookups_of_a_sample(sampled)}, stop);
+  if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !plan.undecidable.empty()))) {
+    auto of_walks = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range,
+                              prepared.theory, {.each = lookups_of_a_sample(sampled)}, stop);
+    if (of_walks)
+      laws = *std::move(of_walks);
+    else
+      untested.push_back(fmt::format("laws of walks: {}", kTooLong));
+  }
   // Bins are coarse; where weights are 1 the distribution itself can be looked at.
   if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path) {
     const std::string why_not = why_no_free_path_laws(*prepared.scene, prepared.range, prepared.theory);
     if (!why_not.empty()) untested.push_back("distribution of free paths: " + why_not);
-    for (const LawRecord& law :
-         free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop))
-      laws.push_back(law);
+    const std::vector<LawRecord> of_flights =
+        free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop);
+    if (of_flights.empty() && why_not.empty()) untested.push_back(fmt::format("distribution of free paths: {}", kTooLong));
+    laws.insert(laws.end(), of_flights.begin(), of_flights.end());
   }
   if (judged && !plan.variances.empty()) {
     std::vector<Real> logs;

@@ -55,6 +55,14 @@ TEST(Judging, ToleratingEpsilonIsNeverWrong) {
   }
 }
 
+/// Walks of 2e6 lookups where theory states fewer than 100: their record would not fit memory.
+TEST(Judging, WalksThatOutgrowARecordingAreSaidToBeUntested) {
+  const auto records = run(R"("samples_per_ray":2,"verdict":{"laws":"always","max_samples_per_ray":2},
+                              "matrix":{"estimator":"planted_decomposition_reset","medium":{"type":"linear","optical_depth":100},
+                                        "majorant":{"type":"global","looseness":100}})");
+  EXPECT_EQ(verdict_of(records).untested, std::vector<std::string>{"laws of walks: walks take more lookups than a recording holds"});
+}
+
 /// The same bias where none is tolerated: a FAIL once the samples are enough for it, and its size is told.
 TEST(Judging, ToleratingNothingFindsWhatIsBelowEpsilon) {
   const auto records = run(

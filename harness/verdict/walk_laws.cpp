@@ -78,6 +78,7 @@ class LawTester {
         kernel_.sample(*workspace, *scene_.medium->medium, context_, key, first_sample::kLaws + done,
                        std::min(batch, samples - done), cell_.quantity, block, counters);
         workspace->recording = nullptr;
+        if (counters.overruns > 0) return false;
         for (std::size_t i = 0; i < recording.walks.size(); ++i) {
           take(recording.walks[i], &block.values[i * outputs_]);
           now.push_back(centred_flight(recording.walks[i]));
@@ -300,11 +301,11 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
 
 }  // namespace
 
-std::vector<LawRecord> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
-                                 SampleRange range, const CellTheory& theory, const LawBudget& budget,
-                                 const std::function<bool()>& stop) {
+std::optional<std::vector<LawRecord>> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
+                                                SampleRange range, const CellTheory& theory, const LawBudget& budget,
+                                                const std::function<bool()>& stop) {
   LawTester tester(cell, scene, kernel, targets, theory);
-  if (!tester.run(budget, stop)) return {};
+  if (!tester.run(budget, stop)) return std::nullopt;
   std::vector<LawRecord> records = tester.records();
   if (cell.quantity == Quantity::transmittance && scene.rays->world.size() > 0)
     if (auto segments = segments_law(cell, scene, kernel, range, theory, tester.rays(), budget, stop))
