@@ -95,8 +95,9 @@ std::optional<Real> measure_reliance(const Cell& cell, const Scene& scene, const
     if (stop() || pair.counters.overruns > 0 || !std::isnormal(answer) || !std::isfinite(difference)) return std::nullopt;
     // Samples a ray that the error and rare samples ask for.
     const Real error = variance / (kMostError * answer * kMostError * answer);
-    const Real wanted =
-        std::max(error * static_cast<Real>(each), kRareSamples * target / std::abs(answer) / static_cast<Real>(taken));
+    const Real rare = kRareSamples * target / std::abs(answer) / static_cast<Real>(taken);
+    // Without random numbers all samples of a ray are one.
+    const Real wanted = pair.counters.draws == 0 ? 0 : std::max(error * static_cast<Real>(each), rare);
     if (wanted <= static_cast<Real>(each)) return std::clamp(std::round(difference / answer * 1e4) / 1e4, -kLargest, kLargest);
     const bool hopeless = wanted * static_cast<Real>(2 * taken) > 2 * static_cast<Real>(kMostSamples);
     if (hopeless || pair.counters.lookups >= kMostLookups || pair.counters.samples >= kMostSamples) return std::nullopt;
