@@ -112,7 +112,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
  private:
   /// Counts of a block.
   struct Tally {
-    std::uint64_t draws = 0, lookups = 0, real = 0;
+    std::uint64_t draws = 0, lookups = 0, real = 0, violations = 0;
     std::size_t walks = 0;  ///< in the first lanes, including walks that ended since the last compaction
     std::size_t dead = 0;   ///< lanes of ended walks
   };
@@ -163,6 +163,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       }
       counters.draws += tally.draws;
       counters.lookups += tally.lookups;
+      counters.violations += tally.violations;
       if constexpr (!Traits::kIgnoresMajorant) counters.null_collisions += tally.lookups - tally.real;
     }
 
@@ -193,7 +194,8 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       Streams rng(walks.stream, alive);
       const Pack extinction = Pack::load(&state.extinction[k]);
       if constexpr (!Traits::kIgnoresMajorant)
-        audit_majorant(extinction, majorant.template rate<several>(flight.piece()), alive, counters);
+        audit_majorant(extinction, majorant.template rate<several>(flight.piece()), alive, tally.violations,
+                       counters.largest_violation);
       kernel.estimator_.consume(walks.walk, state.ray, flight, extinction, rng);
       propose(k, walks, alive, flight, rng, step, tally);
     }

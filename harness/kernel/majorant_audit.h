@@ -10,23 +10,29 @@
 namespace nullmark {
 
 /// The majorant audit of all loops: counts a lookup above the bound of its segment, and keeps the largest ratio of the two.
-inline void audit_majorant(Real extinction, Real bound, Counters& counters) {
-  if (!exceeds(extinction, bound)) return;
+/// Violations are rare, so what they need stays out of the loops.
+[[gnu::noinline, gnu::cold]] inline void count_violation(Real extinction, Real bound, Counters& counters) {
   ++counters.violations;
   counters.largest_violation = std::max(counters.largest_violation, extinction / bound);
 }
+inline void audit_majorant(Real extinction, Real bound, Counters& counters) {
+  if (exceeds(extinction, bound)) [[unlikely]]
+    count_violation(extinction, bound, counters);
+}
 
-/// The same for the walks of a register that are `alive`.
+/// The same for the walks of a register that are `alive`.  All of it is inlined: a call would make the loop keep its registers in
+/// memory.
 template <class T, std::size_t N>
 [[gnu::always_inline]] inline void audit_majorant(Lanes<T, N> extinction, Lanes<T, N> bound, LaneMask<T, N> alive,
-                                                  Counters& counters) {
-  const LaneMask<T, N> exceeding = extinction > bound * Lanes<T, N>(1 + kBoundRounding<T>);
+                                                  std::uint64_t& violations, Real& largest_violation) {
+  LaneMask<T, N> exceeding = extinction > bound * Lanes<T, N>(1 + kBoundRounding<T>);
   if (none(exceeding)) return;
-  const LaneMask<T, N> violations = exceeding & alive;
+  exceeding = exceeding & alive;
+  violations += count(exceeding);
+  const Lanes<T, N> excess = select(exceeding, extinction / bound, Lanes<T, N>(0));
   T ratio[N];
-  select(violations, extinction / bound, Lanes<T, N>(0)).store(ratio);
-  counters.violations += count(violations);
-  counters.largest_violation = std::max<Real>(counters.largest_violation, *std::max_element(ratio, ratio + N));
+  excess.store(ratio);
+  largest_violation = std::max<Real>(largest_violation, *std::max_element(ratio, ratio + N));
 }
 
 }  // namespace nullmark
