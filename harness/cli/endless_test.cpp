@@ -25,8 +25,8 @@ class Endless : public ProgramTest {
   /// Exit code of a run that is sent a signal, if any, some time after its first cell was finished; and its seconds from then on.
   std::pair<int, double> ended(const std::string& options, const char* signal) const {
     const std::string command = fmt::format(
-        "cd '{}' && {{ '{}' run c.json -o r.json {} >out 2>err & }}; "
-        "while kill -0 $! && ! grep -q '1/2' err; do sleep .02; done 2>/dev/null; sleep .1; date +%s.%N >since; {} wait $!",
+        "cd '{}' && rm -f err && {{ '{}' run c.json -o r.json {} >out 2>err & }}; "
+        "while kill -0 $! && ! grep -qs '1/2' err; do sleep .02; done 2>/dev/null; sleep .1; date +%s.%N >since; {} wait $!",
         folder_.string(), NULLMARK_FAULTY_PROGRAM, options, signal ? fmt::format("kill -{} $!;", signal) : "");
     const int status = std::system(command.c_str());
     const double now = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();

@@ -109,9 +109,12 @@ class PageTest(unittest.TestCase):
     def draw_all(self):
         """By scrolling each plot into view, as a reader would."""
         for plot in self.browser.find_elements(By.CSS_SELECTOR, ".graph"):
-            self.js("arguments[0].scrollIntoView()", plot)
-            self.wait(lambda: self.js("return Array.isArray(arguments[0].data)", plot))
+            self.draw(plot)
         return self.js(PLOTS)
+
+    def draw(self, plot):
+        """By scrolling it into view, again where plots above it grow and push it away before it is seen."""
+        self.wait(lambda: self.js("arguments[0].scrollIntoView(); return Array.isArray(arguments[0].data) && arguments[0].data.length > 0", plot))
 
     def facet(self, key, which):
         box = self.find(f"[data-facet={key}]")

@@ -116,6 +116,5 @@ class PlotsTest(PageTest):
                     self.js("document.getElementById(arguments[0]).scrollIntoView()", section)
                     plots = self.browser.find_elements(By.CSS_SELECTOR, f"#{section} .graph")
                     self.assertTrue(plots, f"{section}: {value}")
-                    self.js("arguments[0].scrollIntoView()", plots[0])
-                    self.wait(lambda: self.js("return Array.isArray(arguments[0].data) && arguments[0].data.length > 0", plots[0]))
+                    self.draw(plots[0])
                 Select(select).select_by_value(before)
