@@ -65,7 +65,12 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
   std::optional<VerdictRecord> verdict;
   if (sampled && test_plan)
     verdict = judge(prepared, *test_plan, *sampled, kept, plan.error_rates, families, outcome.effort, stop, progress);
-  if (!sampled || (test_plan && !verdict)) {
+  const bool judged = sampled && (!test_plan || verdict);
+  std::optional<Real> reliance;
+  if (judged && outcome.effort.overruns == 0)
+    reliance = measure_reliance(prepared.planned(), *prepared.scene, *prepared.kernel, stop);
+  // Laws, replays and reliance that are cut off would be missing without a word, as if they did not apply.
+  if (!judged || stop()) {
     record.reason = why();
     return outcome;
   }
@@ -82,7 +87,7 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
   }
   if (record.status == Status::ok) {
     add_verdict(record, prepared, verdict);
-    record.reliance = measure_reliance(prepared.planned(), *prepared.scene, *prepared.kernel, stop);
+    record.reliance = reliance;
   } else {
     drop_sampled_statistics(record);
   }

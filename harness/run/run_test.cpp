@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <csignal>
 #include <stdexcept>
 
 #include "harness/analysis/check.h"
@@ -177,6 +178,25 @@ TEST(Run, AnObserverThatThrowsEndsIt) {
   };
   EXPECT_THROW(run(cells, 4, observer), std::runtime_error);
   EXPECT_EQ(told, 3u);
+}
+
+/// The interrupt comes when all samples are drawn and the laws, the replay and the reliance are not yet tested.
+TEST(Run, ACellThatIsCutOffAfterItsSamplesIsNotDone) {
+  const Plan plan = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
+      "samples_per_ray":65536,"matrix":{"estimator":"ratio","medium":{"type":"linear","optical_depth":0.1}}}]})",
+                                "test.json");
+  std::atomic<int> interrupted{0};
+  RunOptions options;
+  options.timing = false;
+  options.interrupted = &interrupted;
+  RunObserver observer;
+  observer.progress = [&](const CellRecord&, double fraction) {
+    if (fraction >= 1) interrupted = SIGINT;
+  };
+  const CellRecord record = run_plan(plan, {true}, {}, options, observer).at(0);
+  EXPECT_EQ(record.status, Status::not_run);
+  EXPECT_EQ(record.reason, kInterrupted);
+  EXPECT_FALSE(record.verdict);
 }
 
 TEST(Run, StatisticsHoldTheVerdict) {

@@ -281,7 +281,7 @@ class TestPlanner {
                             pilot_->variance_of_variance);
       if (!theory_.infinite_variance)
         plan_.remedies = "state a range of the samples (kRange), their variance (theory), or the guarantee \"exact\"";
-    } else if (plan_.undecidable.empty() && sure_ > plan_.allowance) {
+    } else if (plan_.undecidable.empty() && (plan_.planned > plan_.affordable || sure_ > plan_.allowance)) {
       plan_.undecidable = plan_.planned > plan_.affordable ? needs_ : tight_;
     }
   }

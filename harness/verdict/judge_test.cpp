@@ -60,7 +60,20 @@ TEST(Judging, WalksThatOutgrowARecordingAreSaidToBeUntested) {
   const auto records = run(R"("samples_per_ray":2,"verdict":{"laws":"always","max_samples_per_ray":2},
                               "matrix":{"estimator":"planted_decomposition_reset","medium":{"type":"linear","optical_depth":100},
                                         "majorant":{"type":"global","looseness":100}})");
-  EXPECT_EQ(verdict_of(records).untested, std::vector<std::string>{"laws of walks: walks take more lookups than a recording holds"});
+  EXPECT_EQ(verdict_of(records).untested,
+            std::vector<std::string>{"laws of walks: walks take more lookups than a recording holds"});
+}
+
+/// A plan above the samples is not drawn without an allowance, and the cell says so beforehand, also where four times the samples
+/// would be sure to decide it.
+TEST(Judging, APlanAboveTheSamplesIsNotExpectedToBeDecided) {
+  const std::string cell = R"("samples_per_ray":300000{},"matrix":{{"estimator":"ratio","medium":"cosine"}})";
+  const auto without = run(fmt::format(fmt::runtime(cell), R"(,"verdict":{"epsilon":0.01})"));
+  EXPECT_GT(verdict_of(without).planned, 300000u);
+  EXPECT_TRUE(verdict_of(without).planned_undecidable);
+  EXPECT_EQ(verdict_of(without).reason.rfind("not decidable at 300000 samples a ray", 0), 0u) << verdict_of(without).reason;
+  const auto with = run(fmt::format(fmt::runtime(cell), R"(,"verdict":{"epsilon":0.01,"max_samples_per_ray":1200000})"));
+  EXPECT_EQ(verdict_of(with).unbiased, Outcome::pass);
 }
 
 /// The same bias where none is tolerated: a FAIL once the samples are enough for it, and its size is told.
