@@ -105,10 +105,15 @@ void count_cell(CellRecord& record, Summary& summary) {
   }
 }
 
-/// Whether a published claim was reproduced or refuted: a result without a verdict of its own.
+/// Whether a claim was reproduced or refuted: a result without a verdict of its own.
 bool claim_decided(const Summary& summary) {
   return std::any_of(summary.findings.begin(), summary.findings.end(),
                      [](const ClaimFinding& one) { return one.outcome != ClaimOutcome::cannot_tell; });
+}
+
+bool has_required(const Summary& summary, ClaimOutcome outcome) {
+  return std::any_of(summary.findings.begin(), summary.findings.end(),
+                     [&](const ClaimFinding& one) { return one.claim->required && one.outcome == outcome; });
 }
 
 bool has_order(const Summary& summary, Outcome outcome) {
@@ -116,14 +121,13 @@ bool has_order(const Summary& summary, Outcome outcome) {
 }
 
 ExitCode exit_of(const Summary& summary) {
-  const bool missed = std::any_of(summary.expectations.begin(), summary.expectations.end(),
-                                  [](const Expectation& one) { return one.measured && !one.met; });
-  const bool told = claim_decided(summary);
-  if (summary.fail > 0 || has_order(summary, Outcome::fail) || missed) return ExitCode::bias_proven;
+  const bool told = claim_decided(summary), untold = has_required(summary, ClaimOutcome::cannot_tell);
+  if (summary.fail > 0 || has_order(summary, Outcome::fail) || has_required(summary, ClaimOutcome::refuted))
+    return ExitCode::bias_proven;
   if (summary.errors > 0 || summary.altered > 0) return ExitCode::internal_error;
-  if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0 && !told)
+  if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0 && !told && !untold)
     return ExitCode::nothing_ran;
-  const bool open = summary.never_started > 0 || summary.unexpected_open > 0 || (summary.pass == 0 && !told) ||
+  const bool open = summary.never_started > 0 || summary.unexpected_open > 0 || (summary.pass == 0 && !told) || untold ||
                     !summary.nothing_proven.empty() || !summary.undecided_trackers.empty() ||
                     (summary.strict && summary.undecided_claims > 0);
   return open ? ExitCode::inconclusive : summary.exit;
@@ -144,7 +148,6 @@ Summary summarise(RunRecord& run, bool strict) {
   summary.undecided_claims = undecided_claims(run);
   summary.undecided_trackers = undecided_trackers(run);
   summary.orders = fit_orders(run.cells);
-  summary.expectations = expectations(run);
   summary.findings = findings(run);
   if (summary.pass > 0 && summary.pass == summary.own_mean && !has_order(summary, Outcome::pass) && !claim_decided(summary))
     summary.nothing_proven = "no cell proves anything about the quantity itself: only own means passed";

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "harness/analysis/claim_findings.h"
-#include "harness/analysis/expectation.h"
 #include "harness/io/json_input.h"
 #include "harness/model/exit_code.h"
 #include "harness/model/record.h"
@@ -29,8 +28,7 @@ struct Summary {
   /// Why the cells that passed are not enough for success; empty if they are.
   std::string nothing_proven;
   std::vector<OrderFit> orders;
-  std::vector<Expectation> expectations;  ///< numbers that the configuration expects of its cells
-  std::vector<ClaimFinding> findings;     ///< published claims; a refuted one is a result, not a failure
+  std::vector<ClaimFinding> findings;  ///< of the claims; a refuted one is a failure only if it is required
   ExitCode exit = ExitCode::ok;
 };
 

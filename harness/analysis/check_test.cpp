@@ -97,6 +97,67 @@ TEST(SummaryStrict, EveryClaimMustBeDecided) {
   EXPECT_EQ(summary_of({open_as_planned(), failed()}, true).exit, ExitCode::bias_proven);
 }
 
+/// One cell that passed, and a required claim that its variance, which is 1 and known to a few per cent, is at most a number.
+RunRecord with_claim(Real at_most) {
+  RunRecord run = run_of({passed()});
+  CellRecord& record = run.cells[0];
+  record.samples = 100'000;
+  record.channel[0].variance = 1;
+  record.channel[0].kurtosis = 3;
+  ClaimPart part;
+  part.says = "of the first cell";
+  part.metric = "variance";
+  part.cells = {record.cell.name};
+  part.relation = Relation::at_most;
+  part.numbers = {at_most};
+  run.claims = {{"C", "a paper", "It varies so much.", "", {part}, true}};
+  return run;
+}
+
+TEST(CheckOfRequiredClaims, TheirOutcomeIsThatOfTheRun) {
+  struct Case {
+    Real at_most;
+    ExitCode required;
+    std::string line, test;
+  };
+  for (const Case& one : {Case{2, ExitCode::ok, "", "<testcase classname=\"required claim\" name=\"C: It varies so much.\"/>"},
+                          Case{0.5, ExitCode::bias_proven, "required claim C is refuted: of the first cell: variance 1 +- ",
+                               "<failure message=\"refuted: of the first cell: variance 1 +- "},
+                          Case{1, ExitCode::inconclusive, "required claim C cannot be told: of the first cell: variance 1 +- ",
+                               "<skipped message=\"cannot tell: of the first cell: variance 1 +- "}}) {
+    RunRecord run = with_claim(one.at_most);
+    const Summary summary = summarise(run);
+    EXPECT_EQ(summary.exit, one.required) << one.at_most;
+    const std::string text = summary_text(run, summary), markdown = summary_markdown(run, summary, "r.json"),
+                      xml = junit(run, "r");
+    EXPECT_NE(text.find(one.line), std::string::npos) << text;
+    EXPECT_NE(text.find(" (required): It varies so much."), std::string::npos) << text;
+    EXPECT_NE(markdown.find(one.line), std::string::npos) << markdown;
+    EXPECT_NE(xml.find(one.test), std::string::npos) << xml;
+    EXPECT_NE(xml.find("tests=\"2\""), std::string::npos) << xml;
+
+    run.claims[0].required = false;
+    const Summary without = summarise(run);
+    EXPECT_EQ(without.exit, ExitCode::ok) << one.at_most;
+    EXPECT_EQ(summary_text(run, without).find("required"), std::string::npos);
+    EXPECT_NE(junit(run, "r").find("tests=\"1\""), std::string::npos);
+  }
+}
+
+TEST(CheckOfRequiredClaims, OneWithoutItsCellsIsMissed) {
+  RunRecord run = with_claim(2);
+  run.claims[0].parts[0].cells = {"another"};
+  const Summary summary = summarise(run);
+  EXPECT_EQ(summary.exit, ExitCode::inconclusive);
+  EXPECT_NE(summary_text(run, summary).find("required claim C cannot be told: of the first cell: the cell was not run\n"),
+            std::string::npos);
+  // Nothing else was asked for.
+  run.cells[0] = unjudged("the configuration disables the verdict");
+  EXPECT_EQ(summarise(run).exit, ExitCode::inconclusive);
+  run.claims[0].required = false;
+  EXPECT_EQ(summarise(run).exit, ExitCode::nothing_ran);
+}
+
 TEST(JunitOfCells, NoVerdictIsNoPass) {
   VerdictRecord untested;
   untested.against = "reference";
@@ -175,6 +236,32 @@ TEST_F(Selection, WhatIsNoCountOfCellsIsIgnored) {
     json["provenance"]["selected"] = Json::parse(hostile);
     write("h.json", json.dump());
     EXPECT_EQ(run("check h.json"), 77) << hostile;
+  }
+}
+
+class CheckClaims : public ProgramTest {
+ protected:
+  /// The exit code of `check` for a claim on E[X] = exp(-0.5) = 0.607.
+  int check_with(const std::string& claim) const {
+    write("c.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
+      {"name":"e","rays":"single","samples_per_ray":20000,"verdict":{"epsilon":0.1},"matrix":{"estimator":"ratio","medium":"linear"}}],
+      "claims":[{"id":"C","source":"theory","claim":"So it is.",)" +
+                        claim + "}]}");
+    EXPECT_EQ(run("run c.json -o r.json --force"), 0) << read("err");
+    return run("check r.json");
+  }
+  static std::string part(const std::string& compared) { return R"("parts":[{"metric":"mean","cells":{},)" + compared + "}]"; }
+};
+
+TEST_F(CheckClaims, OnlyRequiredOnesDecideTheExitCode) {
+  const std::string required = R"("required":true,)", reproduced = part(R"("at_least":0.5)"), refuted = part(R"("at_most":0.5)"),
+                    open = part(R"("near":"theory","tolerance":1e-6)");
+  EXPECT_EQ(check_with(required + reproduced), 0) << read("out");
+  EXPECT_EQ(check_with(required + refuted), 3) << read("out");
+  EXPECT_EQ(check_with(required + open), 77) << read("out");
+  for (const std::string& other : {reproduced, refuted, open}) {
+    EXPECT_EQ(check_with(other), 0) << read("out");
+    EXPECT_EQ(check_with(R"("required":false,)" + other), 0) << read("out");
   }
 }
 

@@ -6,8 +6,8 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
-#include "harness/analysis/expectation.h"
 #include "harness/analysis/scaling.h"
+#include "harness/analysis/table_values.h"
 #include "harness/model/cost.h"
 #include "harness/model/metrics.h"
 #include "harness/verdict/cell_word.h"
@@ -67,15 +67,25 @@ class Comparer {
       return std::nullopt;
     }
     if (is_rounding(*record, of, *value)) return exactly(*value);
-    if (*error > kLargestRelativeError * std::abs(*value) && of.find("variance") != std::string::npos) {
-      reason = fmt::format("heavy tails: the error of the sample {} is {:.0f} % of it", of, 100 * *error / std::abs(*value));
-      return std::nullopt;
+    if (const std::string tail = tail_of(of); !tail.empty()) {
+      const Real spread = std::abs(metric(*record, tail).value_or(0)), its_error = standard_error(*record, tail).value_or(0);
+      if (its_error > kLargestRelativeError * spread && !is_rounding(*record, tail, spread)) {
+        reason = fmt::format("heavy tails: the error of the sample {} is {:.0f} % of it", tail, 100 * its_error / spread);
+        return std::nullopt;
+      }
     }
     return Interval{*value, *value - deviations_ * *error, *value + deviations_ * *error};
   }
 
+  /// The variance, if any, that must be known for a metric to be known.
+  static std::string tail_of(const std::string& of) {
+    if (of == "weighted_cost") return "weight_variance";
+    return of.find("variance") == std::string::npos ? "" : of;
+  }
+
   /// The kurtosis of what rounding leaves of a variance says nothing.
   static bool is_rounding(const CellRecord& record, const std::string& of, Real value) {
+    if (of == "weight_variance") return value <= kRounding * kRounding;  // the mean weight is about 1
     const Real rounding = kRounding * (record.channel.empty() ? 0 : record.channel[0].reference_rms.value_or(0));
     return (of == "variance" || of == "variance_x_lookups") && value <= rounding * rounding;
   }

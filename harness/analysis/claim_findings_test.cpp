@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "harness/model/metrics.h"
 #include "harness/report/claims_text.h"
 #include "harness/testing/record_examples.h"
 
@@ -115,6 +116,32 @@ TEST(Findings, WhatWasNotMeasuredOrIsNotKnownProvesNothing) {
   EXPECT_EQ(found(run, part).outcome, ClaimOutcome::cannot_tell);
   part.cells = {"z"};
   EXPECT_EQ(found(run, part).outcome, ClaimOutcome::cannot_tell);
+}
+
+/// N E[w^2] of two lookups and a weight of mean 1.
+TEST(Findings, TheWeightedCostHasTheErrorsOfItsFactors) {
+  RunRecord run = run_of({1});
+  CellRecord& record = run.cells[0];
+  record.outputs = {"weight"};
+  record.lookups_per_sample = 2;
+  record.lookups_variance = 1;
+  record.channel[0].variance = 0.5;
+  EXPECT_NEAR(*standard_error(record, "weighted_cost"), 1.5 * 1e-3 + 2 * 0.5 * std::sqrt(2e-6), 1e-15);
+  ClaimPart part = variance_of({"a"}, Relation::near);
+  part.metric = "weighted_cost";
+  part.numbers = {3};
+  part.tolerance = 0.01;
+  EXPECT_EQ(outcome(run, part), ClaimOutcome::reproduced);
+  part.numbers = {3.1};
+  EXPECT_EQ(outcome(run, part), ClaimOutcome::refuted);
+  // One sample makes the variance of the weight, however little it adds to the cost.
+  record.channel[0].variance = 1e-3;
+  record.channel[0].kurtosis = 1e6;
+  part.numbers = {2};
+  EXPECT_EQ(outcome(run, part), ClaimOutcome::cannot_tell);
+  // Unless it is nothing at all.
+  record.channel[0].variance = 1e-30;
+  EXPECT_EQ(outcome(run, part), ClaimOutcome::reproduced);
 }
 
 TEST(Findings, RoundingIsNoVariance) {

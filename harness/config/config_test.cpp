@@ -238,6 +238,15 @@ TEST(Config, SelectorsMatchExactlyOneCell) {
             "t.json: /tables/0/rows/0/cells/c: matches no cell; expected exactly one, and no cell has this \"estimator\"");
 }
 
+TEST(Config, ATableTestsNothing) {
+  EXPECT_EQ(
+      error_of(
+          R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":"linear"}}],
+          "tables":[{"title":"T","rows":[{"label":"R","given":{"p":1},"cells":{"c":{"experiment":"e"}},"tolerance":0.1}]}]})"),
+      "t.json: /tables/0/rows/0/tolerance: is not tested in a table; use a claim with \"required\": true, \"near\" and "
+      "\"tolerance\"");
+}
+
 TEST(Config, CommentKeysAreIgnoredEverywhere) {
   EXPECT_EQ(names(plan_of(
                 R"("x-a":1,"matrix":{"x-b":[],"estimator":{"type":"ratio","x-c":{}},"medium":{"type":"linear","x-d":[1,2]}})")),

@@ -117,15 +117,14 @@ Json cell_definitions() {
 }
 
 Json table_schema() {
-  const Json row = closed_object(
-      {{"label", {{"type", "string"}}},
-       {"given", {{"type", "object"}, {"additionalProperties", {{"type", "number"}}}}},
-       {"cells", {{"type", "object"}, {"additionalProperties", reference("selector")}}},
-       {"theory", reference("selector")},
-       {"relative_to", described(reference("selector"), "the row's metric is divided by that of this cell")},
-       {"tolerance", described(positive_schema(), "relative; check fails if a cell is farther from the first given number")},
-       {"note", {{"type", "string"}}}},
-      {"label"});
+  const Json row =
+      closed_object({{"label", {{"type", "string"}}},
+                     {"given", {{"type", "object"}, {"additionalProperties", {{"type", "number"}}}}},
+                     {"cells", {{"type", "object"}, {"additionalProperties", reference("selector")}}},
+                     {"theory", reference("selector")},
+                     {"relative_to", described(reference("selector"), "the row's metric is divided by that of this cell")},
+                     {"note", {{"type", "string"}}}},
+                    {"label"});
   return closed_object(
       {{"title", {{"type", "string"}}}, {"metric", {{"enum", metric_names()}, {"default", "rmse"}}}, {"rows", list_of(row)}},
       {"title", "rows"});
@@ -149,9 +148,11 @@ Json claim_schema() {
        {"slope_against", described(metric, "compare the slope of log metric over the log of this one")}},
       {"cells"});
   return closed_object({{"id", {{"type", "string"}}},
-                        {"source", described({{"type", "string"}}, "paper and place")},
+                        {"source", described({{"type", "string"}}, "paper and place, or the equation")},
                         {"claim", {{"type", "string"}}},
                         {"note", described({{"type", "string"}}, "how the test differs from the publication")},
+                        {"required", described({{"type", "boolean"}, {"default", false}},
+                                               "check fails if it is refuted, and is inconclusive if it cannot be told")},
                         {"parts", list_of(part, 1)}},
                        {"id", "source", "claim", "parts"});
 }

@@ -68,6 +68,13 @@ TEST(Schema, RefusesWhatTheReaderRefuses) {
     EXPECT_THROW(read_config(experiment(keys), "t.json"), InputError) << keys;
   }
   EXPECT_NE(check(R"({"experiments":[]})"), "");
+  const auto table = [&](const std::string& keys) {
+    std::string text = experiment(good);
+    text.back() = ',';
+    return text + R"("tables":[{"title":"T","rows":[{"label":"R","given":{"p":1})" + keys + "}]}]}";
+  };
+  EXPECT_EQ(check(table("")), "");
+  EXPECT_NE(check(table(R"(,"tolerance":0.1)")), "");
 }
 
 TEST(Schema, AcceptsResultsAndRefusesBrokenOnes) {

@@ -108,6 +108,7 @@ Json claims_json(const std::vector<PublishedClaim>& claims) {
     }
     Json entry = {{"id", claim.id}, {"source", claim.source}, {"claim", claim.claim}};
     if (!claim.note.empty()) entry["note"] = claim.note;
+    if (claim.required) entry["required"] = true;
     entry["parts"] = std::move(parts);
     list.push_back(std::move(entry));
   }
@@ -118,9 +119,10 @@ void read_claims(const JsonNode& node, const CellReader& finder, std::vector<Pub
   std::set<std::string> ids;
   for (const PublishedClaim& earlier : claims) ids.insert(earlier.id);
   for (const JsonNode& entry : node.elements()) {
-    entry.expect_keys({"id", "source", "claim", "note", "parts"});
+    entry.expect_keys({"id", "source", "claim", "note", "required", "parts"});
     PublishedClaim claim{entry["id"].string(), entry["source"].string(), entry["claim"].string(), "", {}};
     if (entry.has("note")) claim.note = entry["note"].string();
+    if (entry.has("required")) claim.required = entry["required"].boolean();
     if (!ids.insert(claim.id).second)
       entry["id"].fail(fmt::format("\"{}\" is the id of an earlier claim; expected another", claim.id));
     for (const JsonNode& part : entry["parts"].elements()) claim.parts.push_back(read_part(part, finder));

@@ -101,6 +101,7 @@ TEST(Claims, WhatIsWrongIsNamedWithItsPlace) {
             std::string::npos);
   const std::string good = claim("{" + cells + R"(,"metric":"mean","at_most":1})");
   EXPECT_NE(error_of(good + "," + good).find("is the id of an earlier claim"), std::string::npos);
+  EXPECT_EQ(error_of(R"({"required":1,)" + good.substr(1)), "t.json: /claims/0/required: found 1; expected true or false");
 }
 
 TEST(Claims, OfTwoFilesMayNotShareAnId) {
@@ -114,6 +115,8 @@ TEST(Claims, OfTwoFilesMayNotShareAnId) {
 TEST(Claims, ComeBackFromTheAppliedConfigurationAndFromResults) {
   const Plan plan = example_plan();
   ASSERT_EQ(plan.claims[0].parts.size(), 5u);
+  EXPECT_FALSE(plan.claims[0].required);
+  EXPECT_TRUE(plan.claims[1].required);
   const Json written = claims_json(plan.claims);
   EXPECT_EQ(claims_json(read_config(plan.config_text, "applied.json").claims), written);
   EXPECT_EQ(claims_json(read_results(results_text(example_results(plan)), "r.json").claims), written);

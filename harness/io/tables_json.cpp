@@ -14,7 +14,6 @@ Json tables_json(const std::vector<Table>& tables) {
       for (const auto& [heading, cell] : row.cells) entry["cells"][heading] = {{"cell", cell}};
       if (row.theory_of) entry["theory"] = {{"cell", *row.theory_of}};
       if (row.relative_to) entry["relative_to"] = {{"cell", *row.relative_to}};
-      if (row.tolerance) entry["tolerance"] = *row.tolerance;
       if (!row.note.empty()) entry["note"] = row.note;
       rows.push_back(std::move(entry));
     }
@@ -26,7 +25,9 @@ Json tables_json(const std::vector<Table>& tables) {
 namespace {
 
 TableRow read_row(const JsonNode& node, const CellReader& finder) {
-  node.expect_keys({"label", "given", "cells", "theory", "note", "relative_to", "tolerance"});
+  if (node.has("tolerance"))
+    node["tolerance"].fail("is not tested in a table; use a claim with \"required\": true, \"near\" and \"tolerance\"");
+  node.expect_keys({"label", "given", "cells", "theory", "note", "relative_to"});
   TableRow row;
   row.label = node["label"].string();
   if (node.has("note")) row.note = node["note"].string();
@@ -42,10 +43,6 @@ TableRow read_row(const JsonNode& node, const CellReader& finder) {
   }
   if (node.has("theory")) row.theory_of = finder.one(node["theory"]);
   if (node.has("relative_to")) row.relative_to = finder.one(node["relative_to"]);
-  if (node.has("tolerance")) {
-    row.tolerance = node["tolerance"].positive();
-    if (row.given.empty() || row.cells.empty()) node["tolerance"].fail("needs \"given\" and \"cells\" beside it");
-  }
   return row;
 }
 

@@ -110,6 +110,13 @@ Maybe variance_x_lookups_error(const CellRecord& record) {
   const Maybe v = channel_average(record, &ChannelRecord::variance), n = record.lookups_per_sample;
   return variance && lookups && v && n ? Maybe(std::hypot(*variance * *n, *lookups * *v)) : std::nullopt;
 }
+/// Lookups and weights are of the same walks: their errors may add up.
+Maybe weighted_cost_error(const CellRecord& record) {
+  const ChannelRecord* of = weight(record);
+  const Maybe lookups = lookups_error(record), variance = of ? error_of_variance(record, *of) : std::nullopt;
+  const Maybe n = record.lookups_per_sample;
+  return lookups && variance && n ? Maybe(*lookups * (1 + *of->variance) + *n * *variance) : std::nullopt;
+}
 Maybe sample_rmse_error(const CellRecord& record) {
   const Maybe rmse = sample_rmse(record), relative = channel_average_of(record, [&](const ChannelRecord&channel) {
                                             return relative_error_of_variance(record, channel);
@@ -158,7 +165,7 @@ const std::vector<Metric>& metrics() {
        [](Record r) { return weight(r, &Channel::variance_theory); },
        [](Record r) { return weight(r) ? error_of_variance(r, *weight(r)) : std::nullopt; }},
       {"weighted_cost", [](Record r) { return weighted_cost(r.lookups_per_sample, weight(r, &Channel::variance)); },
-       [](Record r) { return weighted_cost(r.lookups_theory, weight(r, &Channel::variance_theory)); }, nullptr,
+       [](Record r) { return weighted_cost(r.lookups_theory, weight(r, &Channel::variance_theory)); }, weighted_cost_error,
        "weighted_cost_theory"},
       {"draws_per_sample", [](Record r) -> Maybe { return r.draws_per_sample; }},
       {"variance_x_ns",

@@ -153,8 +153,7 @@ struct TableRow {
   std::vector<std::pair<std::string, std::string>> cells;  ///< column heading, cell name
   std::optional<std::string> theory_of;                    ///< cell name whose theory column is shown
   std::optional<std::string> relative_to;                  ///< cell name; the row's metrics are divided by those of this cell
-  std::optional<Real> tolerance;  ///< relative distance allowed between each measured number and the first given one
-  std::string note;               ///< e.g. "not reproduced"
+  std::string note;                                        ///< e.g. "not reproduced"
 };
 struct Table {
   std::string title, metric = "rmse";

@@ -24,13 +24,14 @@ struct ClaimPart {
   std::string slope_against;        ///< not empty: compares the slope of log metric over log of this metric
 };
 
-/// A statement of a publication that cells of this configuration test.
+/// A statement of a publication, or of theory, that cells of this configuration test.
 struct PublishedClaim {
   std::string id;      ///< "C03"
-  std::string source;  ///< paper and place
+  std::string source;  ///< paper and place, or the equation
   std::string claim;   ///< what is claimed
   std::string note;    ///< how the test differs from the publication, where it does
   std::vector<ClaimPart> parts;
+  bool required = false;  ///< it must be reproduced; otherwise a refuted claim is a result, not a failure
 };
 
 }  // namespace nullmark

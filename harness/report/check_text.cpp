@@ -46,10 +46,6 @@ bool disables_verdict(const Json& cell) {
   return spec.is_object() && spec.contains("enabled") && spec["enabled"] == false;
 }
 
-std::size_t met(const std::vector<Expectation>& all) {
-  return static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [](const Expectation& one) { return one.met; }));
-}
-
 /// ": 3 because no ray meets any extinction: nothing was tested"; empty where no cell says why.
 std::string reasons_of_unclaimed(const RunRecord& run) {
   std::map<std::string, std::size_t> reasons;
@@ -74,6 +70,10 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
   if (summary.altered > 0) lines.push_back(fmt::format("{} verdicts in the file are not what its figures say", summary.altered));
   lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());
   if (!summary.nothing_proven.empty()) lines.push_back(summary.nothing_proven);
+  for (const ClaimFinding& one : summary.findings)
+    if (one.claim->required && one.outcome != ClaimOutcome::reproduced)
+      lines.push_back(fmt::format("required claim {} {}: {}", one.claim->id,
+                                  one.outcome == ClaimOutcome::refuted ? "is refuted" : "cannot be told", deciding_figures(one)));
   if (summary.strict && summary.undecided_claims > 0)
     lines.push_back(fmt::format("--strict: {} cells that claim something are not decided", summary.undecided_claims));
   return lines;
@@ -101,10 +101,6 @@ std::string summary_text(const RunRecord& run, const Summary& summary) {
       if (kind_of(record) == kind && (kind != Kind::pass || !marks_of(record).empty()))
         text += fmt::format("{}: {}: {}\n", marked_word(record), record.cell.name, finding_of(record));
   for (const OrderFit& fit : summary.orders) text += fmt::format("ORDER: {}\n", order_line(fit));
-  for (const Expectation& one : summary.expectations)
-    if (!one.met) text += fmt::format("{}: {}\n", one.measured ? "EXPECTED OTHERWISE" : "NOT MEASURED", expectation_line(one));
-  if (!summary.expectations.empty())
-    text += fmt::format("{} of {} expected numbers met\n", met(summary.expectations), summary.expectations.size());
   if (!summary.findings.empty()) text += findings_text(summary.findings);
   for (const std::string& line : remarks_of(run, summary)) text += line + "\n";
   return text + fmt::format("{}\n{}\n", counts(run, summary), families(run));
@@ -134,11 +130,6 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
   table({Kind::expected_open}, "Undecidable by their mean, as planned", false);
   table({Kind::violated}, "Need a true majorant and did not have one", false);
   table({Kind::pass}, "Passed, with a mark", false);
-  if (!summary.expectations.empty()) {
-    text += fmt::format("\n{} of {} expected numbers met.\n", met(summary.expectations), summary.expectations.size());
-    for (const Expectation& one : summary.expectations)
-      if (!one.met) text += fmt::format("- {}\n", markdown_cell(expectation_line(one)));
-  }
   if (!summary.findings.empty()) text += fmt::format("\n{}", findings_markdown(summary.findings));
   if (!summary.orders.empty()) {
     text += "\n| convergence order |\n|---|\n";

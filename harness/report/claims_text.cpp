@@ -64,6 +64,10 @@ std::size_t count(const PartFinding& part, ClaimOutcome outcome) {
       std::count_if(part.compared.begin(), part.compared.end(), [&](const ComparedCell& one) { return one.outcome == outcome; }));
 }
 
+std::string marked_outcome(const ClaimFinding& finding) {
+  return fmt::format("{}{}", to_string(finding.outcome), finding.claim->required ? " (required)" : "");
+}
+
 }  // namespace
 
 std::string findings_count(const std::vector<ClaimFinding>& all) {
@@ -92,10 +96,23 @@ std::string figures_of(const PartFinding& part) {
   return text;
 }
 
+std::string deciding_figures(const ClaimFinding& finding) {
+  std::string text;
+  std::size_t others = 0;
+  for (const PartFinding& part : finding.parts) {
+    if (part.outcome != finding.outcome) continue;
+    if (text.empty())
+      text = fmt::format("{}{}", part.part->says.empty() ? "" : part.part->says + ": ", figures_of(part));
+    else
+      ++others;
+  }
+  return others == 0 ? text : fmt::format("{} (and {} more)", text, others);
+}
+
 std::string findings_text(const std::vector<ClaimFinding>& all) {
   std::string text;
   for (const ClaimFinding& one : all) {
-    text += fmt::format("{}: {}: {}\n", one.claim->id, to_string(one.outcome), one.claim->claim);
+    text += fmt::format("{}: {}: {}\n", one.claim->id, marked_outcome(one), one.claim->claim);
     for (const PartFinding& part : one.parts)
       text += fmt::format("    {}{}{}\n", one.parts.size() > 1 ? fmt::format("{}: ", to_string(part.outcome)) : "",
                           part.part->says.empty() ? "" : fmt::format("{}: ", part.part->says), figures_of(part));
@@ -111,7 +128,7 @@ std::string findings_markdown(const std::vector<ClaimFinding>& all) {
       const PartFinding& part = one.parts[i];
       const std::string says = part.part->says.empty() ? "" : fmt::format("{}: ", part.part->says);
       const std::string word = one.parts.size() > 1 ? fmt::format("{}: ", to_string(part.outcome)) : "";
-      lines.push_back({i == 0 ? one.claim->id : "", i == 0 ? fmt::format("**{}**", to_string(one.outcome)) : "",
+      lines.push_back({i == 0 ? one.claim->id : "", i == 0 ? fmt::format("**{}**", marked_outcome(one)) : "",
                        i == 0 ? fmt::format("{} ({}){}", one.claim->claim, one.claim->source, note) : "",
                        word + says + figures_of(part)});
     }

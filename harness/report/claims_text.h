@@ -13,6 +13,9 @@ std::string findings_count(const std::vector<ClaimFinding>& all);
 /// farthest beyond it.
 std::string figures_of(const PartFinding& part);
 
+/// The figures that give a claim its outcome: those of the first part that has it, and how many more have it.
+std::string deciding_figures(const ClaimFinding& finding);
+
 /// For the terminal: every claim with its verdict, and the figures of each part.
 std::string findings_text(const std::vector<ClaimFinding>& all);
 

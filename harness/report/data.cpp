@@ -9,8 +9,8 @@
 
 #include "harness/analysis/check.h"
 #include "harness/analysis/comparison.h"
-#include "harness/analysis/expectation.h"
 #include "harness/analysis/scaling.h"
+#include "harness/analysis/table_values.h"
 #include "harness/config/cell_names.h"
 #include "harness/io/results_json.h"
 #include "harness/io/spec_json.h"
@@ -118,8 +118,9 @@ Json claim_json(const ClaimFinding& finding, const CellsByName& cells, const Pla
                      {"figures", figures_of(part)},
                      {"cells", std::move(of_cells)}});
   }
-  return {{"id", finding.claim->id},     {"source", finding.claim->source},       {"claim", finding.claim->claim},
-          {"note", finding.claim->note}, {"finding", to_string(finding.outcome)}, {"parts", std::move(parts)}};
+  return {{"id", finding.claim->id},     {"source", finding.claim->source},     {"claim", finding.claim->claim},
+          {"note", finding.claim->note}, {"required", finding.claim->required}, {"finding", to_string(finding.outcome)},
+          {"parts", std::move(parts)}};
 }
 
 Json matrix_json(const std::vector<Comparison>& all, const Places& places) {

@@ -66,8 +66,10 @@ TEST(Export, JunitTellsErrorsAndSkippedCellsAndHowToRepeatThem) {
   run.cells[2].status = Status::error;
   run.cells[2].reason = "3 samples are not finite";
   const std::string text = export_results(run, "junit", "r's.json");
-  EXPECT_NE(text.find("tests=\"4\" failures=\"0\" errors=\"1\" skipped=\"3\""), std::string::npos);
+  EXPECT_NE(text.find("tests=\"5\" failures=\"0\" errors=\"1\" skipped=\"3\""), std::string::npos);
   EXPECT_NE(text.find("<skipped message=\"nothing claimed: no verdict\">"), std::string::npos) << text;
+  EXPECT_NE(text.find("<testcase classname=\"required claim\" name=\"D: so it must be\"/>"), std::string::npos) << text;
+  EXPECT_EQ(text.find("so it is"), std::string::npos) << "a claim that is not required is no test";
   EXPECT_NE(text.find("<skipped message=\"a &lt; b &amp; &quot;c&quot;\">"), std::string::npos);
   EXPECT_NE(text.find("<error message=\"3 samples are not finite\">jq .config 'r'\\''s.json' | nullmark run - -o - --filter "
                       "'^residual_ratio/control:average/linear/global$'</error>"),

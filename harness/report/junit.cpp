@@ -3,8 +3,9 @@
 
 #include <string_view>
 
-#include "harness/analysis/expectation.h"
+#include "harness/analysis/claim_findings.h"
 #include "harness/io/text.h"
+#include "harness/report/claims_text.h"
 #include "harness/verdict/cell_word.h"
 #include "harness/verdict/convergence_order.h"
 
@@ -80,16 +81,19 @@ std::string junit(const RunRecord& run, const std::string& file) {
         failed ? fmt::format("claimed {:.0f}, measured {:.3f} +- {:.3f}", fit.claimed, fit.order, fit.half_width) : fit.reason;
     cases += fmt::format(">\n      <{0} message=\"{1}\"/>\n    </testcase>\n", element, xml(message));
   }
-  for (const Expectation& one : expectations(run)) {
+  for (const ClaimFinding& one : findings(run)) {
+    if (!one.claim->required) continue;
     ++others;
-    cases += fmt::format("    <testcase classname=\"expectation\" name=\"{}\"", xml(one.name));
-    if (one.met) {
+    const bool failed = one.outcome == ClaimOutcome::refuted;
+    cases += fmt::format("    <testcase classname=\"required claim\" name=\"{}\"",
+                         xml(fmt::format("{}: {}", one.claim->id, one.claim->claim)));
+    if (one.outcome == ClaimOutcome::reproduced) {
       cases += "/>\n";
       continue;
     }
-    ++(one.measured ? failures : skipped);
-    cases += fmt::format(">\n      <{0} message=\"{1}\"/>\n    </testcase>\n", one.measured ? "failure" : "skipped",
-                         xml(expectation_line(one)));
+    ++(failed ? failures : skipped);
+    cases += fmt::format(">\n      <{0} message=\"{1}\"/>\n    </testcase>\n", failed ? "failure" : "skipped",
+                         xml(fmt::format("{}: {}", to_string(one.outcome), deciding_figures(one))));
   }
   const std::string counts = fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\"", run.cells.size() + others,
                                          failures, errors, skipped);

@@ -6,6 +6,10 @@ function findingBadge(finding) {
   return outcomeBadge(finding, findingBadges[finding]);
 }
 
+function claimVerdict(claim) {
+  return element("span", {}, findingBadge(claim.finding), claim.required ? element("span", { className: "tag" }, "required") : null);
+}
+
 function findingTotals() {
   const counted = Object.keys(findingBadges).map((finding) => [finding, report.claims.filter((claim) => claim.finding === finding).length]);
   return element("p", { className: "totals" }, ...counted.map(([finding, count]) => outcomeBadge(`${count} ${finding}`, findingBadges[finding])));
@@ -25,7 +29,7 @@ function claimFigures(claim) {
 }
 
 function buildClaims(body) {
-  const rows = report.claims.map((claim) => [claim.id, findingBadge(claim.finding), claimText(claim), claimFigures(claim)]);
+  const rows = report.claims.map((claim) => [claim.id, claimVerdict(claim), claimText(claim), claimFigures(claim)]);
   const table = plainTable(["claim", "verdict", "what is claimed, and where", "what was measured"], rows);
   table.classList.add("claims");
   body.append(findingTotals(), table);

@@ -36,6 +36,9 @@ TEST(Report, ShowsTheNumbersOfTheResults) {
     const auto in_ranking = [&](const Json& row) { return row["cell"] == i; };
     EXPECT_EQ(std::count_if(scene["ranking"].begin(), scene["ranking"].end(), in_ranking), 1);
   }
+  ASSERT_EQ(data["claims"].size(), 2u);
+  EXPECT_EQ(data["claims"][0]["required"], false);
+  EXPECT_EQ(data["claims"][1]["required"], true);
   ASSERT_EQ(data["tables"].size(), 1u);
   EXPECT_EQ(data["tables"][0]["columns"], (std::vector<std::string>{"paper", "here", "theory"}));
   const Json& row = data["tables"][0]["rows"][0];

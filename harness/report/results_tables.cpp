@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <map>
 
-#include "harness/analysis/expectation.h"
+#include "harness/analysis/table_values.h"
 #include "harness/config/cell_names.h"
 #include "harness/io/results_json.h"
 #include "harness/io/text.h"

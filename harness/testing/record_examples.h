@@ -21,7 +21,9 @@ inline Plan example_plan() {
       {"metric":"mean","cells":[{"medium":"linear"}],"near":[1,2],"tolerance":0.1},
       {"metric":"lookups_per_sample","cells":{"estimator":"ratio"},"at_least":"theory"},
       {"cells":{"medium":"linear"},"unbiased":true},
-      {"metric":"rmse","cells":{},"slope_against":"samples_per_ray","near":-0.5,"tolerance":0.1}]}]})",
+      {"metric":"rmse","cells":{},"slope_against":"samples_per_ray","near":-0.5,"tolerance":0.1}]},
+      {"id":"D","source":"theory","claim":"so it must be","required":true,"parts":[
+      {"metric":"samples_per_ray","cells":{"estimator":"ratio","medium":"linear"},"near":10,"tolerance":0.1}]}]})",
       "example.json");
 }
 
