@@ -18,6 +18,8 @@
 #include "harness/io/transport_json.h"
 #include "harness/model/names.h"
 #include "harness/statistics/moments.h"
+#include "harness/verdict/cell_word.h"
+#include "harness/verdict/verdict.h"
 
 namespace nullmark {
 namespace {
@@ -215,6 +217,13 @@ void remark(Comparison& comparison) {
   if (one_walk && !lanes.cells.empty()) comparison.remarks.push_back(lanes);
 }
 
+Real possible_bias(const RankedCell& ranked) {
+  // A floor is in the times already.
+  if (ranked.cost && ranked.cost->floor) return 0;
+  const CellRecord& record = *ranked.record;
+  return kind_of(record) == Kind::pass && record.verdict->unbiased == Outcome::pass ? excluded_bias(*record.verdict) : kInfinity;
+}
+
 void decide(Comparison& comparison, const std::vector<RunRecord>& runs, const std::string& baseline) {
   std::vector<RankedCell>& cells = comparison.cells;
   rank(cells);
@@ -239,6 +248,43 @@ void decide(Comparison& comparison, const std::vector<RunRecord>& runs, const st
 
 }  // namespace
 
+bool is_proven_to_reach(const RankedCell& ranked, Real error) {
+  constexpr Real kSlack = 1e-9;  // epsilon was multiplied by the mean, and is divided by it again
+  return ranked.possible_bias <= error * (1 + kSlack);
+}
+
+bool break_even_is_unproven(const Comparison& comparison, const RankedCell& ranked) {
+  return ranked.break_even && ranked.break_even->kind == BreakEven::Kind::at && comparison.best_unbiased &&
+         !is_proven_to_reach(comparison.cells[*comparison.best_unbiased], ranked.break_even->error.value);
+}
+
+std::string unproven_note(const Comparison& comparison) {
+  Real least = kInfinity, most = 0;
+  bool some = false, unexcluded = false;
+  for (std::size_t i = 0; i < comparison.cells.size(); ++i) {
+    const RankedCell& ranked = comparison.cells[i];
+    bool marked = false;
+    for (std::size_t target = 0; target < std::size(kTargets); ++target)
+      marked |=
+          ranked.seconds[target] && std::isfinite(ranked.seconds[target]->value) && !is_proven_to_reach(ranked, kTargets[target]);
+    if (i == comparison.best_unbiased)
+      marked |= std::any_of(comparison.cells.begin(), comparison.cells.end(),
+                            [&](const RankedCell& other) { return break_even_is_unproven(comparison, other); });
+    if (!marked) continue;
+    if (!std::isfinite(ranked.possible_bias)) {
+      unexcluded = true;
+      continue;
+    }
+    some = true;
+    least = std::min(least, ranked.possible_bias);
+    most = std::max(most, ranked.possible_bias);
+  }
+  if (!some) return unexcluded ? "not proven to be reachable: without a PASS no bias is excluded" : "";
+  const std::string from = fmt::format("{:.2g}", 100 * least), to = fmt::format("{:.2g}", 100 * most);
+  return fmt::format("not proven to be reachable: PASS excludes a bias above {} % of the mean, and no smaller one{}",
+                     from == to ? to : fmt::format("{} to {}", from, to), unexcluded ? "; without a PASS none is excluded" : "");
+}
+
 std::vector<Comparison> comparisons(const std::vector<RunRecord>& runs, const std::string& baseline) {
   std::vector<Comparison> all;
   std::map<std::string, std::size_t> places;
@@ -259,6 +305,7 @@ std::vector<Comparison> comparisons(const std::vector<RunRecord>& runs, const st
         ranked.seconds.push_back(ranked.cost ? seconds_to(*ranked.cost, target) : std::nullopt);
         ranked.amortised.push_back(ranked.cost && is_amortised(*ranked.cost, target));
       }
+      ranked.possible_bias = possible_bias(ranked);
       known.insert(known.end(), {ranked.label, record.cell.estimator.type});
       types.insert(record.cell.estimator.type);
       all[place->second].cells.push_back(std::move(ranked));

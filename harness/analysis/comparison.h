@@ -20,6 +20,8 @@ struct RankedCell {
   std::optional<Cost> cost;
   std::vector<std::optional<Interval>> seconds;  ///< to each of kTargets
   std::vector<bool> amortised;                   ///< for each of kTargets: see is_amortised
+  /// Relative bias that may be there unseen: what a PASS does not exclude, infinite without one, 0 where a floor is measured.
+  Real possible_bias = 0;
   /// 1 + number of cells proven faster to the first target, that is with a 95 % interval of the ratio of times above 1.  Equal
   /// ranks are ties.  Absent if no time is known or the target is out of reach.
   std::optional<std::size_t> rank;
@@ -63,6 +65,16 @@ struct Comparison {
   std::vector<Remark> remarks;
   std::vector<Unpaired> unpaired;  ///< other cells with different streams or unknown errors
 };
+
+/// Whether the tracker is proven to have no bias above this relative error, which the times to it take for granted.
+bool is_proven_to_reach(const RankedCell& ranked, Real error);
+
+/// Whether the time of a break-even takes for granted that the best unbiased tracker reaches an error that it is not proven to
+/// reach.
+bool break_even_is_unproven(const Comparison& comparison, const RankedCell& ranked);
+
+/// What is known of the errors that are not proven to be reachable; empty if there are none.
+std::string unproven_note(const Comparison& comparison);
 
 /// All comparisons of some results, in the order of their first cells.  `baseline` is a tracker's type or label, or empty. Throws
 /// InputError if the results hold no such tracker.

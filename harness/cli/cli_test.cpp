@@ -221,6 +221,18 @@ TEST_F(Cli, TimingTellsHowFarItIs) {
   EXPECT_NE(read("err").find("timing 1/2\ntiming 2/2\n"), std::string::npos) << read("err");
 }
 
+TEST_F(Cli, ProveTellsWhichMembersItFound) {
+  // It throws in every flight, so it ends at once.
+  EXPECT_EQ(run("prove '{\"type\":\"faulty\",\"fault\":\"throws\"}' --quick", NULLMARK_FAULTY_PROGRAM),
+            code(ExitCode::internal_error));
+  const std::string text = read("out");
+  const std::size_t used = text.find("\nuses: theory, "), others = text.find("; not stated: ");
+  ASSERT_NE(used, std::string::npos) << text;
+  EXPECT_LT(used, text.find("transmittance_at"));
+  EXPECT_LT(text.find("transmittance_at"), others);
+  EXPECT_LT(others, text.find("event"));
+}
+
 TEST_F(Cli, ListsSchemasAndVersion) {
   for (const char* what : {"estimators", "media", "majorants", "rays", "quantities"}) {
     EXPECT_EQ(run(std::string("list ") + what), 0);

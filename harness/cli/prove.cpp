@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <functional>
@@ -13,6 +14,7 @@
 #include "harness/io/json_input.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
+#include "harness/registry/components.h"
 #include "harness/report/prove_text.h"
 #include "harness/run/battery.h"
 #include "harness/run/medium_contract.h"
@@ -29,6 +31,15 @@ constexpr double kSeconds = 50, kQuickSeconds = 15;
 Json component_argument(const std::string& text) {
   const std::size_t first = text.find_first_not_of(" \t\n");
   return first != std::string::npos && text[first] == '{' ? parse_json(text, "prove") : Json(text);
+}
+
+/// "uses: theory, event; not stated: count_law, ...": a slip in the name of a member shows nowhere else.
+std::string members_text(const std::string& type) {
+  std::vector<std::string> used, others;
+  for (const auto& [member, has] : Registry<EstimatorEntry>::instance().find(type)->members)
+    (has ? used : others).push_back(member);
+  return fmt::format("uses: {}; not stated: {}\n", used.empty() ? "no optional member" : fmt::format("{}", fmt::join(used, ", ")),
+                     fmt::join(others, ", "));
 }
 
 /// Runs the battery and hands its results to `conclude`.
@@ -92,7 +103,7 @@ ExitCode prove_command(const ProveCommand& command) {
   catch_signals();
   return run_battery(command, battery, [&](RunRecord run) {
     const Summary summary = summarise(run);
-    fmt::print("estimator {}\n{}", estimator, scenes_text(run));
+    fmt::print("estimator {}\n{}{}", estimator, members_text(battery.plan.cells[0].estimator.type), scenes_text(run));
     for (const std::string& one : battery.left_out) fmt::print("not tried: {}\n", one);
     fmt::print("{}", findings_text(run));
     for (const std::string& one : summary.undecided_trackers) fmt::print("{}\n", one);

@@ -4,10 +4,16 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <regex>
+#include <set>
+
 #include "estimators/delta.h"
 #include "estimators/jackknife.h"
 #include "estimators/ratio.h"
 #include "estimators/residual_ratio.h"
+#include "harness/io/file_io.h"
+#include "harness/registry/register_estimator.h"
 
 namespace nullmark {
 namespace {
@@ -55,6 +61,42 @@ TEST(EstimatorTraits, AParameterMayHaveTheNameOfAFunction) {
   };
   EXPECT_FALSE(detail::names_component<WithParameters> || detail::names_order<WithParameters>);
   EXPECT_TRUE((expect_estimator<WithParameters, Real>()));
+}
+
+/// Ratio tracking without its `transmittance_at`, and with a slip.
+template <class Value>
+struct Misspelt : RatioTracking<Value> {
+  static constexpr bool transmittance_at = false;
+  Value transmitance_at(const typename RatioTracking<Value>::Walk& walk, const MediumRay<Value>&, Real) const {
+    return walk.weight;
+  }
+};
+
+TEST(EstimatorTraits, AMisspeltMemberIsListedAsNotStated) {
+  const auto members_of = [](const EstimatorEntry& entry) {
+    return std::map<std::string, bool>(entry.members.begin(), entry.members.end());
+  };
+  const auto right = members_of(estimator_entry<RatioTracking>()), wrong = members_of(estimator_entry<Misspelt>());
+  EXPECT_TRUE(right.at("transmittance_at") && right.at("theory") && right.at("kLanes"));
+  EXPECT_FALSE(wrong.at("transmittance_at"));
+  EXPECT_TRUE(wrong.at("theory"));
+  EXPECT_FALSE(right.at("event") || right.at("kNeedsShares"));
+}
+
+TEST(EstimatorTraits, EveryOptionalMemberIsListed) {
+  std::set<std::string> listed;
+  for (const auto& [member, has] : estimator_entry<RatioTracking>().members) listed.insert(member);
+  const std::string traits = read_file(NULLMARK_SOURCE_DIR "/harness/kernel/estimator_traits.h");
+  const std::string interface = read_file(NULLMARK_SOURCE_DIR "/estimators/estimator.h");
+  const std::string optional = interface.substr(interface.find("// Optional:"));
+  std::size_t found = 0;
+  for (const auto& [text, pattern] :
+       {std::pair(&traits, "\nNULLMARK_NAMES\\((\\w+)\\)"), std::pair(&optional, "\\b(k[A-Z]\\w+)[,\n ]")}) {
+    const std::regex regex(pattern);
+    for (std::sregex_iterator at(text->begin(), text->end(), regex), end; at != end; ++at, ++found)
+      EXPECT_TRUE(listed.contains((*at)[1])) << (*at)[1];
+  }
+  EXPECT_GT(found, 24u);
 }
 
 TEST(EstimatorTraits, ControlsAndInversionsAskForTheDepth) {

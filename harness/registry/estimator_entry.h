@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/kernel/kernel.h"
@@ -16,6 +17,8 @@ struct EstimatorEntry {
   bool needs_bound = false;
   bool in_lanes = false;  ///< grey walks run side by side in registers, in double and in float
   bool ignores_majorant = false, heavy_samples = false, heavy_lookups = false;
+  /// The optional members of estimator.h, and whether the tracker has them.  A misspelt one has no effect and is not found.
+  std::vector<std::pair<const char*, bool>> members;
   std::vector<Quantity> quantities;  ///< quantities that it answers on grey media
   std::unique_ptr<EstimatorSource> (*make)() = nullptr;
   bool planted = false;   ///< deliberately wrong, for tests; runs if named, is never listed

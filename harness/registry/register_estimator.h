@@ -7,6 +7,42 @@
 
 namespace nullmark {
 
+/// EstimatorEntry::members.
+template <class E>
+std::vector<std::pair<const char*, bool>> optional_members() {
+  using Traits = EstimatorTraits<E, Real>;
+  constexpr bool data = requires { typename E::RayData; }, lanes = requires { requires E::kLanes; };
+  constexpr bool samples = requires { E::kHeavySamples; }, lookups = requires { E::kHeavyLookups; };
+  constexpr bool depth = requires { E::kNeedsOpticalDepth; };
+  return {{"theory", Traits::kTheory},
+          {"count_law", Traits::kCountLaw},
+          {"event", Traits::kEvent},
+          {"weight_theory", Traits::kWeightTheory},
+          {"samples_events", Traits::kSamplesEvents},
+          {"optical_depth", Traits::kOpticalDepth},
+          {"transmittance_at", Traits::kTransmittanceAt},
+          {"expected", Traits::kExpected},
+          {"parameters", Traits::kParameters},
+          {"check", Traits::kCheck},
+          {"range", Traits::kRangeByParameters},
+          {"order", Traits::kOrder},
+          {"RayData", data},
+          {"prepare", Traits::kPrepare},
+          {"flies_once", Traits::kFliesOnce},
+          {"real_collisions", Traits::kRealCollisions},
+          {"component", Traits::kComponent},
+          {"needs_optical_depth", Traits::kMayNeedOpticalDepth},
+          {"kLanes", lanes},
+          {"kIgnoresMajorant", Traits::kIgnoresMajorant},
+          {"kHeavySamples", samples},
+          {"kHeavyLookups", lookups},
+          {"kOwnFlights", Traits::kOwnFlights},
+          {"kNeedsOpticalDepth", depth},
+          {"kNeedsKnots", Traits::kNeedsKnots},
+          {"kNeedsInversion", Traits::kNeedsInversion},
+          {"kNeedsShares", Traits::kNeedsShares}};
+}
+
 template <template <class> class Estimator>
 EstimatorEntry estimator_entry() {
   using E = Estimator<Real>;
@@ -17,6 +53,7 @@ EstimatorEntry estimator_entry() {
   entry.range = Estimator<Spectrum>::kRange;
   entry.needs_bound = E::kNeedsBound;
   entry.in_lanes = runs_in_lanes<Estimator>();
+  entry.members = optional_members<E>();
   entry.ignores_majorant = requires { E::kIgnoresMajorant; };
   entry.heavy_samples = requires { E::kHeavySamples; };
   entry.heavy_lookups = requires { E::kHeavyLookups; };

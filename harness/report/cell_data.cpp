@@ -88,6 +88,7 @@ Json cost_json(const RankedCell& ranked) {
     entry["error"] = kTargets[i];
     entry["amortised"] = ranked.amortised[i];
     entry["reached"] = ranked.seconds[i] && std::isfinite(ranked.seconds[i]->value);
+    entry["proven"] = is_proven_to_reach(ranked, kTargets[i]);
     seconds.push_back(std::move(entry));
   }
   return {{"basis", cost.analytic ? "analytic" : "sample"},

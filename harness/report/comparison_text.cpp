@@ -29,7 +29,8 @@ std::string shown(const std::optional<Interval>& x) { return x ? shown(*x) : "-"
 std::string time_shown(const RankedCell& ranked, std::size_t target) {
   const std::optional<Interval>& seconds = ranked.seconds[target];
   if (seconds && !std::isfinite(seconds->value)) return "never";
-  return fmt::format("{}{}", ranked.amortised[target] ? "~" : "", shown(seconds));
+  const bool unproven = seconds && !is_proven_to_reach(ranked, kTargets[target]);
+  return fmt::format("{}{}{}", ranked.amortised[target] ? "~" : "", shown(seconds), unproven ? "*" : "");
 }
 
 std::string rank_shown(const RankedCell& ranked) {
@@ -43,10 +44,11 @@ std::string floor_shown(const RankedCell& ranked) {
   return floor.low > 0 ? fmt::format("{:.2g} %", 100 * floor.value) : fmt::format("< {:.2g} %", 100 * floor.high);
 }
 
-std::string break_even_shown(const RankedCell& ranked) {
+std::string break_even_shown(const Comparison& comparison, const RankedCell& ranked) {
   if (!ranked.break_even) return "";
   if (ranked.break_even->kind != BreakEven::Kind::at) return to_string(ranked.break_even->kind);
-  return fmt::format("{} s, at {:.2g} %", shown(ranked.break_even->seconds), 100 * ranked.break_even->error.value);
+  return fmt::format("{} s, at {:.2g} %{}", shown(ranked.break_even->seconds), 100 * ranked.break_even->error.value,
+                     break_even_is_unproven(comparison, ranked) ? "*" : "");
 }
 
 bool any_floor(const Comparison& comparison) {
@@ -65,7 +67,7 @@ std::vector<Line> ranking(const Comparison& comparison) {
     lines.push_back({rank_shown(ranked), ranked.label, standing_of(*ranked.record), cost ? shown(cost->variance) : "-",
                      cost ? shown(cost->variance_x_lookups) : "-", cost ? shown(cost->variance_x_ns) : "-", time_shown(ranked, 0),
                      time_shown(ranked, 1), shown(ranked.relative)});
-    if (floors) lines.back().insert(lines.back().end(), {floor_shown(ranked), break_even_shown(ranked)});
+    if (floors) lines.back().insert(lines.back().end(), {floor_shown(ranked), break_even_shown(comparison, ranked)});
   }
   return lines;
 }
@@ -104,6 +106,11 @@ std::string amortised_line(const Comparison& comparison) {
   return "";
 }
 
+std::string unproven_line(const Comparison& comparison) {
+  const std::string note = unproven_note(comparison);
+  return note.empty() ? "" : fmt::format("* {}\n", note);
+}
+
 std::string remark_lines(const Comparison& comparison) {
   std::string text;
   for (const Remark& remark : comparison.remarks) {
@@ -130,7 +137,7 @@ std::string compare_text(const std::vector<RunRecord>& runs, const std::string& 
   std::string text;
   for (const Comparison& comparison : comparisons(runs, baseline)) {
     text += fmt::format("{}\n{}", comparison.name, aligned(ranking(comparison), 2));
-    text += amortised_line(comparison) + remark_lines(comparison);
+    text += amortised_line(comparison) + unproven_line(comparison) + remark_lines(comparison);
     if (paired && !comparison.pairings.empty()) text += aligned(pairs(comparison), 1);
     if (paired) text += not_paired(comparison);
     text += baseline_line(comparison) + "\n\n";
@@ -144,7 +151,10 @@ std::string compare_markdown(const std::vector<RunRecord>& runs, const std::stri
   std::string text;
   for (const Comparison& comparison : comparisons(runs, baseline)) {
     text += fmt::format("**{}**\n\n{}\n", markdown_cell(comparison.name), markdown_table(ranking(comparison)));
-    for (const std::string& line : {amortised_line(comparison), remark_lines(comparison)})
+    // A line that begins with a star would be a list.
+    const std::string unproven = unproven_line(comparison);
+    for (const std::string& line :
+         {amortised_line(comparison), unproven.empty() ? "" : "\\" + unproven, remark_lines(comparison)})
       if (!line.empty()) text += markdown_cell(line) + "\n";
     if (paired && !comparison.pairings.empty()) text += markdown_table(pairs(comparison)) + "\n";
     if (paired && !comparison.unpaired.empty()) text += markdown_cell(not_paired(comparison)) + "\n";

@@ -48,7 +48,8 @@ Json scene_json(const Comparison& comparison, const Places& places) {
                           {"against", cell(*comparison.best_unbiased)},
                           {"kind", to_string(ranked.break_even->kind)},
                           {"seconds", at ? interval(ranked.break_even->seconds) : Json(nullptr)},
-                          {"error", at ? interval(ranked.break_even->error) : Json(nullptr)}});
+                          {"error", at ? interval(ranked.break_even->error) : Json(nullptr)},
+                          {"proven", !break_even_is_unproven(comparison, ranked)}});
   }
   return {{"name", comparison.name},
           {"quantity", comparison.quantity},
@@ -59,6 +60,7 @@ Json scene_json(const Comparison& comparison, const Places& places) {
           {"measurement", comparison.measurement},
           {"baseline", cell_or_null(comparison.baseline)},
           {"best_unbiased", cell_or_null(comparison.best_unbiased)},
+          {"unproven", unproven_note(comparison)},
           {"ranking", std::move(ranking)},
           {"break_even", std::move(break_even)}};
 }

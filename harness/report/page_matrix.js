@@ -63,7 +63,7 @@ function hoverOfEntry(entry, view, label, scene) {
   const relative = entry.relative === null ? "" : `${formatNumber(entry.relative, 3)} times the best unbiased of the scene`;
   const floor = floorText(entry.cell);
   return plotLines([
-    label, scene.name, `${view.title}: ${formatInterval(entry.cost)}`, entry.nothing ? nothingText(entry) : relative,
+    label, scene.name, `${view.title}: ${formatInterval(entry.cost)}${unprovenMark(entry.cost)}`, entry.nothing ? nothingText(entry) : relative,
     ...(floor ? [`floor of the error ${floor}`] : [])]);
 }
 
@@ -151,11 +151,11 @@ function matrixAxis(theme, names, angle, every) {
 function matrixCaption({ labels, scenes, entries }) {
   const best = labels.map((label, row) => [label, entries[row].filter(({ relative, cell }) => relative === 1 && standsUnbiased(cell)).length]).sort((a, b) => b[1] - a[1]);
   const named = best.filter(([, count]) => count > 0).map(([label, count]) => `${label} ${count}`);
-  return `${countOf(labels.length, "estimator")} on ${countOf(scenes.length, "scene")}. Best unbiased of its column, and how often: ${listed(named) || "none"}.`;
+  return `${countOf(labels.length, "estimator")} on ${countOf(scenes.length, "scene")}. Best unbiased of its column, and how often: ${listed(named) || "none"}. ${unprovenHint(entries.flat().map(({ cost }) => cost))}`;
 }
 
 function matrixNumbers({ labels, scenes, entries }) {
-  const rows = scenes.map((scene, column) => [scene.short, ...entries.map((line) => formatInterval(line[column].cost))]);
+  const rows = scenes.map((scene, column) => [scene.short, ...entries.map((line) => `${formatInterval(line[column].cost)}${unprovenMark(line[column].cost)}`)]);
   return plainTable(["scene", ...labels], rows);
 }
 

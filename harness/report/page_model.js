@@ -93,6 +93,16 @@ function secondsTo(cell, target) {
   return cell.cost?.seconds[target] ?? null;
 }
 
+/** The mark of a time to an error that is not proven to be reachable; the notes of the scenes say why. */
+function unprovenMark(time) {
+  return time && time.reached !== false && time.proven === false ? "*" : "";
+}
+
+/** What stands below such marks, outside the rankings. */
+function unprovenHint(times) {
+  return times.some((time) => unprovenMark(time) !== "") ? "* not proven to be reachable: the rankings say why." : "";
+}
+
 /** The word that `nullmark check` counts a cell by. */
 function outcomeOf(cell) {
   return cell.word;

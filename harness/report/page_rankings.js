@@ -9,15 +9,14 @@ function reachedText(cell, place) {
   const target = secondsTo(cell, place);
   if (!target || !cell.time?.ns_per_sample) return unknown;
   if (!target.reached) return "never";
-  const text = intervalText(target, formatSeconds);
-  return target.amortised ? element("span", {}, "~", text) : text;
+  return element("span", {}, target.amortised ? "~" : "", intervalText(target, formatSeconds), unprovenMark(target));
 }
 
 function breakEvenText(scene, place) {
   const entry = scene.break_even.find(({ cell }) => cell === place);
   if (!entry) return "";
   if (entry.kind !== "at") return entry.kind;
-  return `${formatSeconds(entry.seconds?.value)}, at ${formatPercent(entry.error?.value)}`;
+  return `${formatSeconds(entry.seconds?.value)}, at ${formatPercent(entry.error?.value)}${unprovenMark(entry)}`;
 }
 
 function estimatorCell(scene, entry, cell) {
@@ -51,6 +50,10 @@ function amortisedNote(entries) {
   return some ? element("p", { className: "says" }, "~ fewer samples are needed than shared a walk through the majorant structure when they were timed.") : "";
 }
 
+function unprovenNote(scene) {
+  return anythingTimed && scene.unproven ? element("p", { className: "says" }, `* ${scene.unproven}.`) : "";
+}
+
 function unpairedText(scene) {
   const reasons = report.unpaired.filter((one) => one.scene === scene.index && passes(report.cells[one.cell]));
   return reasons.length === 0 ? "" : `Not paired: ${reasons.map((one) => `${report.cells[one.cell].label} ${one.reason}`).join("; ")}.`;
@@ -73,7 +76,7 @@ function pairedTable(scene) {
 function showRanking(panel, scene) {
   const entries = scene.ranking.filter((entry) => passes(report.cells[entry.cell]));
   const table = element("table", { className: "ranking" }, headRow(rankingColumns.map(({ title }) => title)), element("tbody", {}, ...entries.map((entry) => rankingRow(scene, entry))));
-  panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), amortisedNote(entries), pairedTable(scene) ?? ""));
+  panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), amortisedNote(entries), unprovenNote(scene), pairedTable(scene) ?? ""));
 }
 
 function buildRanking(body) {

@@ -17,7 +17,8 @@ function claimTag(cell) {
 
 function namesAndSeconds(entries) {
   const names = entries.flatMap((entry, i) => [i > 0 ? " = " : "", markedLabel(entry.label), claimTag(report.cells[entry.cell]) ?? ""]);
-  const seconds = entries.map((entry) => formatSeconds(secondsTo(report.cells[entry.cell], 0)?.value));
+  const times = entries.map((entry) => secondsTo(report.cells[entry.cell], 0));
+  const seconds = times.map((time) => `${formatSeconds(time?.value)}${unprovenMark(time)}`);
   return [element("span", {}, ...names), seconds.join(" = ")];
 }
 
@@ -59,7 +60,10 @@ function buildSummary(body) {
   return () => {
     const scenes = report.scenes.filter((scene) => winnersOf(scene).length > 0);
     winners.hidden = scenes.length === 0;
+    const named = scenes.flatMap((scene) => [...winnersOf(scene), ...unbiasedWinnersOf(scene)]);
+    const hint = unprovenHint(named.map((entry) => secondsTo(report.cells[entry.cell], 0)));
     winners.replaceChildren(
-      element("summary", {}, winnersSentence(scenes)), plainTable(["scene", "fastest to 1\u00a0% (= tied)", "seconds a ray", "fastest unbiased", "seconds a ray"], scenes.map(winnerRow)));
+      element("summary", {}, winnersSentence(scenes)), plainTable(["scene", "fastest to 1\u00a0% (= tied)", "seconds a ray", "fastest unbiased", "seconds a ray"], scenes.map(winnerRow)),
+      hint ? element("p", { className: "about" }, hint) : "");
   };
 }

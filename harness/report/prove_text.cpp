@@ -65,23 +65,30 @@ std::string scenes_text(const RunRecord& run) {
 }
 
 std::string findings_text(const RunRecord& run) {
+  enum class Sort { failed, open, untested };
+  const auto sort_of = [](Kind kind) {
+    if (kind == Kind::fail || kind == Kind::error || kind == Kind::violated) return Sort::failed;
+    return kind == Kind::unexpected_open || kind == Kind::expected_open ? Sort::open : Sort::untested;
+  };
   struct Found {
     const CellRecord* first = nullptr;
     std::size_t count = 0;
   };
-  std::map<std::pair<bool, std::string>, Found> found;
+  std::map<std::pair<Sort, std::string>, Found> found;
   for (const CellRecord& record : run.cells) {
     const Kind kind = kind_of(record);
-    const bool failed = kind == Kind::fail || kind == Kind::error || kind == Kind::violated;
-    if (!failed && kind != Kind::unexpected_open && kind != Kind::expected_open) continue;
-    Found& part = found[{!failed, record.cell.experiment}];
+    if (kind == Kind::pass) continue;
+    Found& part = found[{sort_of(kind), record.cell.experiment}];
     if (part.count++ == 0) part.first = &record;
   }
   std::string text;
   for (const auto& [key, part] : found)
-    text +=
-        fmt::format("{}: {}{}\n  {}\n", verdict_word(kind_of(*part.first)), part.first->cell.name,
-                    part.count > 1 ? fmt::format(" and {} more of these scenes", part.count - 1) : "", reason_of(*part.first));
+    text += fmt::format("{}: {}{}\n  {}\n", key.first == Sort::untested ? "not tested" : verdict_word(kind_of(*part.first)),
+                        part.first->cell.name, part.count > 1 ? fmt::format(" and {} more of these scenes", part.count - 1) : "",
+                        reason_of(*part.first));
+  // Nothing else tells a walk that never ends from one that is slow.
+  if (std::all_of(run.cells.begin(), run.cells.end(), [](const CellRecord& cell) { return cell.status == Status::not_run; }))
+    text += "no cell was done in time: does `propose` return false at the end of the ray, and does `theory` end?\n";
   return text;
 }
 

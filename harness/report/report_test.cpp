@@ -47,6 +47,23 @@ TEST(Report, ShowsTheNumbersOfTheResults) {
   EXPECT_EQ(row["cells"][1], 0);
 }
 
+TEST(Report, TellsWhichErrorsAreProvenToBeReachable) {
+  RunRecord run = example_results();
+  run.cells.resize(1);
+  run.cells[0].verdict.emplace();
+  run.cells[0].verdict->against = "reference";
+  run.cells[0].verdict->unbiased = Outcome::pass;
+  TestRecord test;
+  test.basis = "betting";
+  test.reference = 1;
+  test.epsilon = 0.005;
+  run.cells[0].verdict->tests = {test};
+  const Json data = data_of(run);
+  EXPECT_EQ(data["cells"][0]["cost"]["seconds"][0]["proven"], true);
+  EXPECT_EQ(data["cells"][0]["cost"]["seconds"][1]["proven"], false);
+  EXPECT_NE(data["scenes"][0]["unproven"].get<std::string>().find("above 0.5 % of the mean"), std::string::npos);
+}
+
 TEST(Report, TellsOfCellsThatDidNotRun) {
   RunRecord run = example_results();
   run.cells[1] = unsampled(run.cells[1], Status::skipped, "no data");

@@ -83,7 +83,7 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
   }
   if (record.status == Status::ok && outcome.effort.overruns > 0) {
     record.status = Status::error;
-    record.reason = fmt::format("{} walks exceeded the bound on lookups", outcome.effort.overruns);
+    record.reason = fmt::format("{} walks took more than {} lookups", outcome.effort.overruns, Workspace().most_lookups);
   }
   if (record.status == Status::ok) {
     add_verdict(record, prepared, verdict);

@@ -142,6 +142,7 @@ class TestPlanner {
 
   TestPlan plan(SampleRange range, bool bounding) {
     state_range(range, bounding);
+    advise(range, bounding);
     allow();
     if (!analytic_ && !pilot_ && !exact_) return std::move(plan_);
     for (std::size_t o = 0; o < targets_.outputs; ++o) add_means(o);
@@ -157,6 +158,22 @@ class TestPlanner {
     if (cell_.quantity == Quantity::optical_depth || (!bounding && range != SampleRange::binary)) range = SampleRange::any_sign;
     if (range != SampleRange::any_sign) plan_.low = 0;
     if (range == SampleRange::binary || range == SampleRange::unit) plan_.high = 1;
+  }
+
+  /// What of a range would help here.
+  void advise(SampleRange range, bool bounding) {
+    if (cell_.quantity == Quantity::optical_depth)
+      advice_ = "state the variance of the samples (theory)";
+    else if (!bounding)
+      advice_ =
+          "a range (kRange) holds only under a majorant that is known to bound the extinction: give one, or state the variance "
+          "of "
+          "the samples (theory)";
+    else if (range == SampleRange::non_negative)
+      advice_ = "state a range that is bounded above (kRange), the variance of the samples (theory)";
+    else
+      advice_ = "state a range of the samples (kRange), their variance (theory)";
+    advice_ += ", or the guarantee \"exact\"";
   }
 
   /// What the configuration lets a ray cost.
@@ -279,8 +296,7 @@ class TestPlanner {
               ? "the variance is infinite: no number of samples decides the mean"
               : fmt::format("no analytic variance, and a pilot's is not to be trusted (variance of variance {:.2g})",
                             pilot_->variance_of_variance);
-      if (!theory_.infinite_variance)
-        plan_.remedies = "state a range of the samples (kRange), their variance (theory), or the guarantee \"exact\"";
+      if (!theory_.infinite_variance) plan_.remedies = advice_;
     } else if (plan_.undecidable.empty() && (plan_.planned > plan_.affordable || sure_ > plan_.allowance)) {
       plan_.undecidable = plan_.planned > plan_.affordable ? needs_ : tight_;
     }
@@ -365,7 +381,7 @@ class TestPlanner {
   int most_per_sum_ = 1;
   Real mean_lookups_ = 0;
   std::uint64_t sure_ = 0;
-  std::string needs_, tight_;
+  std::string needs_, tight_, advice_;
   TestPlan plan_;
 };
 

@@ -109,6 +109,34 @@ TEST(Words, AFindingIsWhatAPassProvesAndWhyOthersAreNone) {
             "law \"independence\" is broken (log E = 100.0); undecided after 1000 samples a ray; 800 were planned");
 }
 
+/// Catoni's bets take the variance as given, and bets against a bias are his only where samples have no bound above: there the
+/// law is "variance from below".  A pilot's variance is not stated.
+TEST(Words, NoBiasIsProvenByAStatedVarianceThatIsRefuted) {
+  for (const char* law : {"variance", "variance from below", "independence"})
+    for (const char* basis : {"catoni", "catoni+betting", "betting"})
+      for (const char* from : {"analytic", "pilot"}) {
+        CellRecord record = failed();
+        record.verdict->variance_basis = from;
+        record.verdict->tests[0].basis = basis;
+        record.verdict->laws = {{law, 50, 100, Outcome::none}};
+        decide(*record.verdict);
+        EXPECT_EQ(kind_of(record), Kind::fail);
+        const std::string broken = fmt::format("law \"{}\" is broken (log E = 50.0)", law);
+        const bool rests =
+            std::string(law) == "variance from below" && std::string(basis) != "betting" && std::string(from) == "analytic";
+        EXPECT_EQ(
+            finding_of(record),
+            "mean 0.49, expected 0.5: -2 %; " +
+                std::string(rests ? "no bias is proven: the evidence (log E 100.0 > 9.2) rests on the stated variance, which "
+                                    "is too small; "
+                                  : "biased, proven (log E 100.0 > 9.2); ") +
+                broken);
+        record.verdict->laws[0].log_e = 0;
+        decide(*record.verdict);
+        EXPECT_EQ(finding_of(record), "mean 0.49, expected 0.5: -2 %; biased, proven (log E 100.0 > 9.2)");
+      }
+}
+
 TEST(Words, AreTheSameInEveryOutput) {
   CellRecord pass = passed(), fail = failed();
   pass.verdict->bound_unproven = true;

@@ -23,6 +23,9 @@ Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass);
 /// Otherwise INCONCLUSIVE.  `outputs` names the tested outputs if they are not channels.
 void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs = {});
 
+/// What a PASS excludes: |mean error| over all rays, relative to the reference; the largest over the tests of means.
+Real excluded_bias(const VerdictRecord& verdict);
+
 /// Whether laws of walks were tested.  "replay" and "variance" are laws of samples and do not count.
 bool tests_walks(const VerdictRecord& verdict);
 

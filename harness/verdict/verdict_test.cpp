@@ -133,6 +133,21 @@ TEST(Verdict, ReasonsAreGivenAndForgotten) {
   EXPECT_EQ(verdict.reason, "too deep");
 }
 
+/// A channel whose samples are all the same must not speak for one whose mean is known to epsilon.
+TEST(Verdict, APassProvesWhatTheWidestOfItsTestsExcludes) {
+  TestRecord same = deterministic(0), wide = passing(1), group = passing();
+  same.reference = wide.reference = group.reference = 0.5;
+  group.group = 2;
+  group.epsilon = 0.04;
+  VerdictRecord verdict = verdict_of({same, wide, group, passing(-1)});
+  decide(verdict);
+  EXPECT_EQ(verdict.unbiased, Outcome::pass);
+  EXPECT_EQ(verdict.proves, "|bias| < 2 % of the mean");
+  EXPECT_DOUBLE_EQ(excluded_bias(verdict), 0.02);
+  verdict = verdict_of({same});
+  EXPECT_DOUBLE_EQ(excluded_bias(verdict), (same.rounding + same.reference_error) / 0.5);
+}
+
 TEST(Verdict, ViolationsAndImpossibleSamplesComeFirst) {
   VerdictRecord verdict = verdict_of({passing()});
   verdict.out_of_range = 1;

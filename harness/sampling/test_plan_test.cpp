@@ -1,0 +1,47 @@
+// What the plan of a cell's tests advises where nothing can be bet on.
+
+#include "harness/sampling/test_plan.h"
+
+#include <gtest/gtest.h>
+
+namespace nullmark {
+namespace {
+
+/// The advice for one ray of mean 1/2, without theory and with a pilot that shows a heavy tail.
+std::string advice(SampleRange range, bool bounding, Quantity quantity = Quantity::transmittance) {
+  Scene scene;
+  const auto rays = std::make_shared<BuiltRays>();
+  rays->world.resize(1);
+  scene.rays = rays;
+  scene.bounding = bounding;
+  Cell cell;
+  cell.quantity = quantity;
+  cell.samples_per_ray = 1024;
+  Targets targets;
+  targets.mean = {0.5};
+  targets.error = {1e-12};
+  const Pilot pilot{{0.1}, {1}, 1000, 1000, 1};
+  return plan_tests(cell, scene, targets, range, Guarantee::unbiased, {}, pilot, {}).remedies;
+}
+
+TEST(TestPlan, AdvisesOnlyWhatWouldHelp) {
+  constexpr const char *kBound = "a majorant that is known to bound", *kRange = "state a range of the samples (kRange)";
+  EXPECT_EQ(advice(SampleRange::unit, true), "");
+  EXPECT_EQ(advice(SampleRange::any_sign, true).rfind(kRange, 0), 0u);
+  EXPECT_EQ(advice(SampleRange::non_negative, true).rfind("state a range that is bounded above (kRange)", 0), 0u);
+  // A range of 0 and 1 holds whatever the majorant is; others do not.
+  EXPECT_EQ(advice(SampleRange::binary, false), "");
+  for (const SampleRange range : {SampleRange::unit, SampleRange::non_negative, SampleRange::any_sign}) {
+    EXPECT_NE(advice(range, false).find(kBound), std::string::npos) << advice(range, false);
+    EXPECT_EQ(advice(range, false).find("state a range"), std::string::npos) << advice(range, false);
+  }
+  // kRange is that of the transmittance.
+  for (const bool bounding : {true, false})
+    EXPECT_EQ(advice(SampleRange::unit, bounding, Quantity::optical_depth).find("kRange"), std::string::npos);
+  for (const bool bounding : {true, false})
+    for (const char* remedy : {"(theory)", "\"exact\""})
+      EXPECT_NE(advice(SampleRange::any_sign, bounding).find(remedy), std::string::npos);
+}
+
+}  // namespace
+}  // namespace nullmark
