@@ -78,13 +78,18 @@ std::string findings_text(const RunRecord& run) {
   for (const CellRecord& record : run.cells) {
     const Kind kind = kind_of(record);
     if (kind == Kind::pass) continue;
-    Found& part = found[{sort_of(kind), record.cell.experiment}];
+    // Time runs out for all of them alike.
+    const Sort sort = sort_of(kind);
+    Found& part = found[{sort, sort == Sort::untested ? reason_of(record) : record.cell.experiment}];
     if (part.count++ == 0) part.first = &record;
   }
   std::string text;
   for (const auto& [key, part] : found)
     text += fmt::format("{}: {}{}\n  {}\n", key.first == Sort::untested ? "not tested" : verdict_word(kind_of(*part.first)),
-                        part.first->cell.name, part.count > 1 ? fmt::format(" and {} more of these scenes", part.count - 1) : "",
+                        part.first->cell.name,
+                        part.count > 1
+                            ? fmt::format(" and {} more{}", part.count - 1, key.first == Sort::untested ? "" : " of these scenes")
+                            : "",
                         reason_of(*part.first));
   // Nothing else tells a walk that never ends from one that is slow.
   if (std::all_of(run.cells.begin(), run.cells.end(), [](const CellRecord& cell) { return cell.status == Status::not_run; }))
