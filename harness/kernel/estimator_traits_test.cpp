@@ -16,6 +16,16 @@
 #include "harness/registry/register_estimator.h"
 
 namespace nullmark {
+
+/// Ratio tracking without its `transmittance_at`, and with a slip.
+template <class Value>
+struct Misspelt : RatioTracking<Value> {
+  static constexpr bool transmittance_at = false;
+  Value transmitance_at(const typename RatioTracking<Value>::Walk& walk, const MediumRay<Value>&, Real) const {
+    return walk.weight;
+  }
+};
+
 namespace {
 
 using Delta = DeltaTracking<Real>;
@@ -62,15 +72,6 @@ TEST(EstimatorTraits, AParameterMayHaveTheNameOfAFunction) {
   EXPECT_FALSE(detail::names_component<WithParameters> || detail::names_order<WithParameters>);
   EXPECT_TRUE((expect_estimator<WithParameters, Real>()));
 }
-
-/// Ratio tracking without its `transmittance_at`, and with a slip.
-template <class Value>
-struct Misspelt : RatioTracking<Value> {
-  static constexpr bool transmittance_at = false;
-  Value transmitance_at(const typename RatioTracking<Value>::Walk& walk, const MediumRay<Value>&, Real) const {
-    return walk.weight;
-  }
-};
 
 TEST(EstimatorTraits, AMisspeltMemberIsListedAsNotStated) {
   const auto members_of = [](const EstimatorEntry& entry) {

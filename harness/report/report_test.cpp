@@ -10,6 +10,7 @@
 #include "harness/run/image.h"
 #include "harness/testing/program.h"
 #include "harness/testing/record_examples.h"
+#include "harness/testing/verdict_examples.h"
 
 namespace nullmark {
 namespace {
@@ -49,15 +50,8 @@ TEST(Report, ShowsTheNumbersOfTheResults) {
 
 TEST(Report, TellsWhichErrorsAreProvenToBeReachable) {
   RunRecord run = example_results();
-  run.cells.resize(1);
-  run.cells[0].verdict.emplace();
-  run.cells[0].verdict->against = "reference";
-  run.cells[0].verdict->unbiased = Outcome::pass;
-  TestRecord test;
-  test.basis = "betting";
-  test.reference = 1;
-  test.epsilon = 0.005;
-  run.cells[0].verdict->tests = {test};
+  run.cells = {passed()};
+  run.cells[0].verdict->tests[0].epsilon = 0.005 * run.cells[0].verdict->tests[0].reference;
   const Json data = data_of(run);
   EXPECT_EQ(data["cells"][0]["cost"]["seconds"][0]["proven"], true);
   EXPECT_EQ(data["cells"][0]["cost"]["seconds"][1]["proven"], false);
