@@ -46,7 +46,8 @@ void add(const std::string& profile, void (*baseline)(benchmark::State&, Real), 
   const Component majorant{"prescribed", {{"value", lookups}}, {}, {}};
   benchmark::RegisterBenchmark((group + "0 ratio tracking, hand-written").c_str(),
                                [=](benchmark::State& state) { baseline(state, lookups); });
-  for (const ComponentInfo& entry : registered(ComponentKind::estimator)) {
+  for (const EstimatorEntry& entry : Registry<EstimatorEntry>::instance().entries()) {
+    if (entry.planted || entry.foreign) continue;
     const auto bench = [=] { return KernelBench({entry.name, {}, {}, {}}, medium, majorant); };
     try {
       bench().draw();

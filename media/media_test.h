@@ -41,6 +41,8 @@ class Setter final : public ParameterVisitor {
     set(name, value);
     for (const Real x : value) EXPECT_TRUE(range.contains(x)) << name;
   }
+  void texts(const char*, std::vector<std::string>&, const char*) override { ADD_FAILURE() << "no medium here has words"; }
+  void object(const char*, std::string&, const char*) override { ADD_FAILURE() << "no medium here has objects"; }
   void point(const char* name, Vec3& value, const char*, const char*) override { set(name, value); }
 
   /// Names that no parameter has asked for.

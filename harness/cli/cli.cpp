@@ -13,6 +13,7 @@
 #include "harness/analysis/hard_case_table.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/process.h"
+#include "harness/cli/sampling_options.h"
 #include "harness/config/schema.h"
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
@@ -75,9 +76,6 @@ void expect_one_of(const std::string& word, const std::vector<std::string>& name
       near.empty() ? fmt::format("expected one of {}", fmt::join(names, ", ")) : fmt::format("did you mean \"{}\"?", near)));
 }
 
-constexpr const char* kBuilds =
-    "any: also join cells of the same source by another compiler, C library or instruction set, and mark them; default same";
-
 /// The commands of the program, what they take, and what the user asked of them.
 class CommandLine {
  public:
@@ -88,6 +86,8 @@ class CommandLine {
     app_.failure_message(CLI::FailureMessage::simple);
     add_run();
     add_prove();
+    add_problem();
+    add_judge();
     add_replay();
     add_check();
     add_compare();
@@ -144,58 +144,40 @@ class CommandLine {
   }
 
   void add_run() {
-    CLI::App* command = add("run", "Run configurations and write their results", [this] { return run_command(run_); });
-    command->add_option("CONFIG", run_.configs, "Configuration files, folders of configurations, or - for standard input")
-        ->required();
-    command->add_option("-o,--output", run_.output,
-                        "Results file (default: stem of CONFIG + .results.json); - for standard output");
-    command->add_option("--threads", run_.threads, "Number of threads; 0: all cores.  Results do not depend on it")
-        ->check(CLI::Range(0, 4096));
-    command->add_option("--seed", run_.seed, "Seed that replaces that of the configuration, or \"random\"");
-    command->add_option("--filter", run_.filter, "Run only cells whose name matches this regular expression");
-    command->add_flag("--covering", run_.covering,
-                      "Run a subset in which every pair of estimator, medium, depth and majorant occurs");
-    command->add_option("--shard", run_.shard, "Run only part K of N: K/N");
-    command->add_flag("--resume", run_.resume, "Continue from the existing results and journal");
-    command->add_option("--builds", run_.builds, kBuilds)->needs("--resume");
-    command->add_flag("--force", run_.force, "Replace existing results")->excludes("--resume");
-    command->add_flag("--dry-run", run_.dry_run, "Print cells, predicted samples, lookups and time; draw no samples");
-    command->add_option("--time-budget", run_.time_budget, "End sampling and timing after this many seconds")
-        ->check(CLI::Validator(
-            [](const std::string& text) {
-              double seconds = -1;
-              const bool number = CLI::detail::lexical_cast(text, seconds) && std::isfinite(seconds) && seconds >= 0;
-              return number ? std::string() : fmt::format("found \"{}\"; expected seconds >= 0", text);
-            },
-            "SECONDS"));
-    command->add_flag("--no-timing", run_.no_timing, "Skip timing; statistics only");
+    declare_run(*add("run", "Run configurations and write their results", [this] { return run_command(run_); }), run_);
   }
 
   void add_prove() {
-    CLI::App* command = add("prove", "Try one tracker on many scenes, or one medium; exit code 3 if a bias is proven", [this] {
-      if (prove_.estimator.empty() && prove_.medium.empty())
-        throw InputError("prove what? expected an estimator, --medium MEDIUM, or both");
-      prove_.command_line = run_.command_line;
-      return prove_command(prove_);
-    });
-    command->add_option("ESTIMATOR", prove_.estimator, "Name of an estimator, or an object as in a configuration");
-    command->add_option("--medium", prove_.medium,
-                        "Name of a medium, or an object: tests its promises, and the tracker on it alone");
-    command->add_flag("--quick", prove_.quick, "An eighth of the samples and fewer media");
-    command->add_option("--threads", prove_.threads, "Number of threads; 0: all cores")->check(CLI::Range(0, 4096));
-    command->add_option("-o,--output", prove_.output, "Also write the results, for check and replay; replaces an existing file");
+    declare_prove(*add("prove", "Try one tracker on many scenes, or one medium; exit code 3 if a bias is proven",
+                       [this] {
+                         if (prove_.estimator.empty() && prove_.medium.empty())
+                           throw InputError("prove what? expected an estimator, --medium MEDIUM, or both");
+                         prove_.command_line = run_.command_line;
+                         return prove_command(prove_);
+                       }),
+                  prove_);
+  }
+
+  void add_problem() {
+    declare_problem(*add("problem", "Write scenes to a folder, for a renderer whose samples `judge` shall judge",
+                         [this] { return problem_command(problem_); }),
+                    problem_);
+  }
+
+  void add_judge() {
+    declare_judge(*add("judge", "Judge samples in files; exit code 0 for PASS, 3 for FAIL, 77 if undecided",
+                       [this] {
+                         expect_one_of(judge_.range, {"signed", "non_negative", "unit", "binary"}, "range");
+                         judge_.command_line = run_.command_line;
+                         return judge_command(judge_);
+                       }),
+                  judge_);
   }
 
   void add_replay() {
-    CLI::App* command = add("replay", "Draw one sample of a cell again and print every random number, lookup and weight",
-                            [this] { return replay_command(replay_); });
-    command->add_option("RESULTS", replay_.results, "Results file")->required();
-    command->add_option("CELL", replay_.cell, "Name of a cell in the results")->required();
-    CLI::Option* ray =
-        command->add_option("--ray", replay_.ray, "Ray, from 0 (default: that of the sample farthest from its target)");
-    command->add_option("--sample", replay_.sample, "Sample of the ray, from 0 (default: the one farthest from its target)")
-        ->needs(ray);
-    command->add_flag("--json", replay_.json, "Print JSON, with all digits");
+    declare_replay(*add("replay", "Draw one sample of a cell again and print every random number, lookup and weight",
+                        [this] { return replay_command(replay_); }),
+                   replay_);
   }
 
   void add_check() {
@@ -342,6 +324,8 @@ class CommandLine {
   std::function<ExitCode()> action_;
   RunCommand run_;
   ProveCommand prove_;
+  ProblemCommand problem_;
+  JudgeCommand judge_;
   ReplayCommand replay_;
   GateCommand gate_;
   ReportCommand report_;

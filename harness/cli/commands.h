@@ -20,6 +20,7 @@ struct RunCommand {
   int threads = 0;
   std::optional<double> time_budget;
   bool resume = false, force = false, dry_run = false, no_timing = false;
+  bool allow_foreign = false;  ///< as NULLMARK_ALLOW_FOREIGN=1: configurations may run code from outside
   std::vector<std::string> command_line;
 };
 ExitCode run_command(const RunCommand& command);
@@ -31,15 +32,36 @@ struct ProveCommand {
   std::string output;     ///< results file; empty: none
   int threads = 0;
   bool quick = false;
+  bool allow_foreign = false;
   std::vector<std::string> command_line;
 };
 ExitCode prove_command(const ProveCommand& command);
+
+/// `nullmark problem`.
+struct ProblemCommand {
+  std::string config, output;  ///< a configuration file; the folder to write
+  int resolution = 64;         ///< voxels across, of media that are no volumes
+  bool with_answers = false, force = false;
+};
+ExitCode problem_command(const ProblemCommand& command);
+
+/// `nullmark judge`.
+struct JudgeCommand {
+  std::string problem, samples;  ///< folder of `nullmark problem`; an .npy file, or a folder of images
+  std::string range = "signed";  ///< of the samples: "signed", "non_negative", "unit" or "binary"
+  std::string scene;             ///< id; empty: the only one
+  std::string output;            ///< results file; empty: none
+  bool correlated = false;       ///< the rays of a row share random numbers
+  std::vector<std::string> command_line;
+};
+ExitCode judge_command(const JudgeCommand& command);
 
 /// `nullmark replay`.
 struct ReplayCommand {
   std::string results, cell;
   std::string ray, sample;  ///< whole numbers; empty: search
   bool json = false;
+  bool allow_foreign = false;
 };
 ExitCode replay_command(const ReplayCommand& command);
 

@@ -30,6 +30,8 @@ Json parameters_list(ComponentKind kind, const std::string& type) {
 
 void add_traits(const std::string& name, Json& json) {
   const EstimatorEntry& entry = *Registry<EstimatorEntry>::instance().find(name);
+  // Its claims are those of the code that it runs.
+  if (entry.foreign) return;
   const std::unique_ptr<EstimatorSource> source = entry.make();
   Json claims = Json::object();
   for (const Quantity quantity : entry.quantities) claims[to_string(quantity)] = to_string(source->claim(quantity));

@@ -10,6 +10,7 @@
 #include "harness/cli/process.h"
 #include "harness/cli/signals.h"
 #include "harness/cli/watched_run.h"
+#include "harness/foreign/consent.h"
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
 #include "harness/io/outputs.h"
@@ -89,6 +90,7 @@ ExitCode prove_medium_alone(const ProveCommand& command, std::string& text) {
 }  // namespace
 
 ExitCode prove_command(const ProveCommand& command) {
+  take_consent(command.allow_foreign);
   refuse_overwriting({}, {command.output});
   expect_threads(command.threads);
   std::string text;

@@ -6,6 +6,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/cli/process.h"
+#include "harness/foreign/consent.h"
 #include "harness/io/file_io.h"
 #include "harness/io/results_json.h"
 
@@ -25,6 +26,7 @@ std::optional<std::uint64_t> index_of(const std::string& text, const char* optio
 }  // namespace
 
 ExitCode replay_command(const ReplayCommand& command) {
+  take_consent(command.allow_foreign);
   const SampleChoice choice{index_of(command.ray, "--ray"), index_of(command.sample, "--sample")};
   expect_threads(0);
   const RunRecord run = read_results(read_file(command.results), command.results);

@@ -19,6 +19,7 @@
 #include "harness/cli/signals.h"
 #include "harness/cli/watched_run.h"
 #include "harness/config/config.h"
+#include "harness/foreign/consent.h"
 #include "harness/io/file_io.h"
 #include "harness/io/notice.h"
 #include "harness/io/outputs.h"
@@ -281,6 +282,7 @@ ExitCode write_results(const Plan& plan, Earlier cells, const RunContext& contex
 }  // namespace
 
 ExitCode run_command(const RunCommand& command) {
+  take_consent(command.allow_foreign);
   const std::vector<ConfigSource> sources = load_configs(command.configs);
   const std::optional<std::uint64_t> seed = requested_seed(command.seed);
   const Plan plan = read_configs(sources, seed);

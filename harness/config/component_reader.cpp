@@ -42,7 +42,24 @@ std::vector<Real> numbers_within(const JsonNode& node, std::size_t least, std::s
 
 bool holds_list(const ParameterInfo& parameter) {
   return std::holds_alternative<std::vector<Real>>(parameter.default_value) ||
+         std::holds_alternative<std::vector<std::string>>(parameter.default_value) ||
          std::holds_alternative<std::array<Real, 3>>(parameter.default_value);
+}
+
+/// A JSON object, or, as results hold it, the text of one.
+std::string object_text(const JsonNode& node) {
+  const Json object = node.json().is_string() ? known_json(node.string()) : node.json();
+  if (!object.is_object()) node.expected("an object");
+  return object.dump();
+}
+
+std::vector<std::string> words(const JsonNode& node) {
+  constexpr std::size_t kMost = 1000;
+  if (!node.json().is_array() || node.json().empty() || node.json().size() > kMost)
+    node.expected(fmt::format("a list of 1 to {} words", kMost));
+  std::vector<std::string> list;
+  for (const JsonNode& word : node.elements()) list.push_back(word.string());
+  return list;
 }
 
 ParameterValue read_value(const ParameterInfo& parameter, const JsonNode& node) {
@@ -54,10 +71,13 @@ ParameterValue read_value(const ParameterInfo& parameter, const JsonNode& node) 
     case 2:
       return node.boolean();
     case 3:
+      if (parameter.object) return object_text(node);
       return parameter.allowed.empty() ? node.string() : node.one_of(parameter.allowed, parameter.name.c_str());
     case 4:
       return numbers_within(node, static_cast<std::size_t>(parameter.least), static_cast<std::size_t>(parameter.most),
                             parameter.range, parameter.unit);
+    case 6:
+      return words(node);
     default: {
       const std::vector<Real> point = numbers_within(node, 3, 3, Range::any(), parameter.unit);
       return std::array{point[0], point[1], point[2]};

@@ -183,7 +183,10 @@ Json parameter_schema(const ParameterInfo& parameter) {
       json = {{"type", "boolean"}};
       break;
     case 3:
-      json = {{"type", "string"}};
+      json = {{"type", parameter.object ? Json{"object", "string"} : Json("string")}};
+      break;
+    case 6:
+      json = list_of({{"type", "string"}}, 1);
       break;
     case 4:
       json = list_of(range_schema(parameter.range), parameter.least);

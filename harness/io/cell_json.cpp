@@ -31,6 +31,11 @@ ParameterValue read_parameter(ComponentKind kind, const std::string& type, const
   if (json.is_number_float()) return json.get<Real>();
   if (json.is_number()) return static_cast<int>(node.integer(std::numeric_limits<int>::min(), std::numeric_limits<int>::max()));
   if (!json.is_array()) return node.string();
+  if (!json.empty() && json[0].is_string()) {
+    std::vector<std::string> words;
+    for (const JsonNode& element : node.elements()) words.push_back(element.string());
+    return words;
+  }
   std::vector<Real> numbers;
   for (const JsonNode& element : node.elements()) numbers.push_back(element.number());
   if (numbers.size() == 3 && is_point(kind, type, name)) return std::array{numbers[0], numbers[1], numbers[2]};
@@ -225,6 +230,8 @@ void visit_time(Visit& visit, TimeRecord& time, const CellRecord& record) {
   visit.lenient("loop_ratio", time.loop_ratio, "ns_per_lookup over a plain ratio loop on a constant medium");
   visit.required("repetitions", time.repetitions);
   visit.lenient("mad", time.mad, "median absolute deviation of ns_per_sample");
+  visit.sparse("seam_ns_per_sample", NullMeansField{time.seam_ns_per_sample, 0},
+               "part of ns_per_sample that exchanges with the tracker's process cost");
   visit.lenient("waiting", time.waiting, "share of the wall time in which the timed thread did not run");
   visit.required("threads", time.threads);
   visit.derived("traversal_included", [] { return true; });
@@ -275,6 +282,11 @@ void visit_cell(Visit& visit, CellRecord& record) {
     inner.required("claims", record.claims);
     inner.required("range", record.range);
     inner.sparse("order", record.order, "of a consistent estimator's bias in its step");
+    inner.sparse("tracker", record.tracker.name, "what a tracker from outside of nullmark calls itself");
+    inner.sparse("version", record.tracker.version, "of that tracker, as it says");
+    inner.sparse("hash", record.tracker.hash, "of its library, or of its command and the files that it names");
+    inner.sparse("lookups_told", record.tracker.lookups_told, "lookups are what the tracker tells, not counted");
+    inner.sparse("unrepeatable", record.tracker.unrepeatable, "its samples cannot be drawn again");
     inner.sparse("given_depth", record.given_depth, "the estimator is handed the exact optical depth");
   });
   visit.part("medium", [&](auto& inner) {

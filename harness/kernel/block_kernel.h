@@ -4,6 +4,7 @@
 #include <array>
 #include <type_traits>
 
+#include "harness/kernel/free_path_scores.h"
 #include "harness/kernel/kernel.h"
 #include "harness/kernel/majorant_audit.h"
 #include "harness/kernel/ray_preparation.h"
@@ -59,7 +60,7 @@ class BlockKernel : public Kernel {
   std::size_t outputs(Quantity quantity, const PreparedRay& context) const override {
     const auto channels = static_cast<std::size_t>(channels_);
     if (quantity == Quantity::transmittance_profile) return context.marks.size() * channels;
-    if (quantity == Quantity::free_path) return (kFreePathBins + (scatters(context.albedo) ? 3 : 2)) * channels;
+    if (quantity == Quantity::free_path) return free_path_outputs(context.albedo, channels);
     return channels;
   }
 
@@ -250,27 +251,11 @@ class BlockKernel : public Kernel {
     }
   }
 
-  /// Scores of a free path: its weight in the bin of its collision, in scatter if it scatters, in escape if it escapes, and in
-  /// weight.
   void score(State& state, const RayData& ray, std::uint32_t k, const PreparedRay& context, Real* values) const {
-    if constexpr (Traits::kEvent) {
-      const Event<Value> event = estimator_.event(state.walk[k], ray, state.flight[k]);
-      const auto channels = static_cast<std::size_t>(channels_);
-      std::fill(values, values + outputs(Quantity::free_path, context), Real{0});
-      Real* const scattered = values + kFreePathBins * channels;
-      Real* const escaped = scattered + (scatters(context.albedo) ? channels : 0);
-      store(event.weight, escaped + channels);
-      if (event.kind == EventKind::escape) store(event.weight, escaped);
-      if (!is_collision(event.kind)) return;
-      const auto after = std::upper_bound(context.marks.begin(), context.marks.end(), event.distance);
-      const auto cell = std::clamp<std::ptrdiff_t>(after - context.marks.begin() - 1, 0, kFreePathCells - 1);
-      store(event.weight, values + static_cast<std::size_t>(cell) / (kFreePathCells / kFreePathBins) * channels);
-      if (!scatters(context.albedo)) return;
-      // Samplers that leave the kind open are grey.
-      const bool scatter = event.kind == EventKind::scatter ||
-                           (event.kind == EventKind::collision && state.rng[k].uniform() < channel(ray.albedo, 0));
-      if (scatter) store(event.weight, scattered);
-    }
+    if constexpr (Traits::kEvent)
+      score_free_path(
+          estimator_.event(state.walk[k], ray, state.flight[k]), context, static_cast<std::size_t>(channels_),
+          [&] { return state.rng[k].uniform() < channel(ray.albedo, 0); }, values);
   }
 
   void finish(State& state, const RayData& ray, std::uint32_t k, Quantity quantity, const PreparedRay& context,

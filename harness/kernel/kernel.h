@@ -142,6 +142,9 @@ class Kernel {
   /// Whether the walks of a quantity run side by side in registers.
   virtual bool in_lanes(Quantity) const { return false; }
 
+  /// What exchanges with a process have cost this workspace so far, where the tracker lives in one.
+  virtual Real seam_seconds(const Workspace&) const { return 0; }
+
   /// Whether a sample is one flight through a majorant, so that the laws of collisions apply.
   virtual bool flies() const = 0;
 
@@ -157,6 +160,14 @@ class Walker;
 struct Walkers {
   std::shared_ptr<const Walker<Real>> grey;
   std::shared_ptr<const Walker<Spectrum>> chromatic;
+};
+
+/// What a tracker from outside of nullmark says of itself, for records.
+struct TrackerIdentity {
+  std::string name, version;
+  std::uint64_t hash = 0;      ///< of its code: the library, or the command and the files that it names
+  bool tells_lookups = false;  ///< they are of a medium of its own and were not counted here
+  bool repeatable = true;      ///< its samples can be drawn again
 };
 
 /// An estimator's parameters, before it is combined with a medium.
@@ -175,6 +186,10 @@ class EstimatorSource {
   virtual std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64,
                                                bool lanes = true) const = 0;
   virtual Walkers walkers() const { return {}; }
+  /// The folder that paths among the parameters are relative to.
+  virtual void locate(const std::string& /*folder*/) {}
+  /// Of a tracker from outside of nullmark.
+  virtual std::optional<TrackerIdentity> identity() const { return std::nullopt; }
 };
 
 }  // namespace nullmark

@@ -13,7 +13,8 @@
 
 namespace nullmark {
 
-using ParameterValue = std::variant<Real, int, bool, std::string, std::vector<Real>, std::array<Real, 3>>;
+using ParameterValue =
+    std::variant<Real, int, bool, std::string, std::vector<Real>, std::array<Real, 3>, std::vector<std::string>>;
 /// By parameter name; defaults are filled in.
 using ParameterValues = std::map<std::string, ParameterValue>;
 

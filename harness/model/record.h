@@ -51,6 +51,7 @@ struct TimeRecord {
   Real majorant_build_seconds = 0;   ///< wall time of building the majorant structure, on all threads
   std::vector<BatchTime> batches{};  ///< ascending; the last has ns_per_sample; empty if there is only one
   Real memory_ratio = 0;             ///< of volumes: ns per lookup over one read of a random cache line of as many bytes; else 0
+  Real seam_ns_per_sample = 0;       ///< part of ns_per_sample that exchanges with the tracker's process cost; 0: no process
   std::optional<Real> waiting{};     ///< share of the wall time in which the timed thread did not run, median over repetitions
 };
 
@@ -117,13 +118,22 @@ struct VerdictRecord {
   Outcome lawful = Outcome::none;     ///< PASS: no law is broken
 };
 
+/// A tracker from outside of nullmark, as it was when the cell was sampled.
+struct TrackerRecord {
+  std::string name, version;  ///< as it says
+  std::string hash;           ///< of its code, 16 hexadecimal digits; empty: no tracker from outside
+  bool lookups_told = false;  ///< lookups are those that it tells of a medium of its own, not counted by the harness
+  bool unrepeatable = false;  ///< its samples cannot be drawn again
+};
+
 struct CellRecord {
   Cell cell;
   MediumSpec medium;
   Component majorant, ray_set;
   std::string medium_hash;
   std::optional<StructureSize> structure;  ///< of the majorant; absent if it was not built
-  std::string claims, range;
+  std::string claims, range;               ///< empty of a tracker from outside that was not opened
+  TrackerRecord tracker;
   bool given_depth = false;      ///< the estimator is handed the exact optical depth
   std::optional<Real> reliance;  ///< if given_depth: share of its answer that follows that depth, 1: all; see reliance.h
   std::optional<Real> order;     ///< order in the step of a consistent estimator's bias

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 #include <type_traits>
 
@@ -39,6 +40,10 @@ class Describe final : public ParameterVisitor {
       info->least = least;
       info->most = most;
     }
+  }
+  void texts(const char* name, std::vector<std::string>& value, const char* text) override { add(name, value, "", text); }
+  void object(const char* name, std::string& value, const char* text) override {
+    if (ParameterInfo* info = add(name, value, "", text)) info->object = true;
   }
   void point(const char* name, Vec3& value, const char* unit, const char* text) override {
     add(name, std::array<Real, 3>{value.x(), value.y(), value.z()}, unit, text);
@@ -76,6 +81,11 @@ class Assign final : public ParameterVisitor {
   void numbers(const char* name, std::vector<Real>& value, int, int, Range, const char*, const char*) override {
     assign(name, value);
   }
+  void texts(const char* name, std::vector<std::string>& value, const char*) override {
+    assign(name, value);
+    for (std::string& word : value) word = with_variables(word);
+  }
+  void object(const char* name, std::string& value, const char*) override { assign(name, value); }
   void point(const char* name, Vec3& value, const char*, const char*) override {
     std::array<Real, 3> point{value.x(), value.y(), value.z()};
     assign(name, point);
@@ -117,6 +127,12 @@ auto make(ComponentKind kind, const Component& component) {
   source->parameters(assign);
   assign.refuse_the_rest();
   return source;
+}
+
+/// The folder of the file that names a component.
+std::string folder_of(const Component& component) {
+  const std::string file = component.pointer.substr(0, component.pointer.find(": /"));
+  return std::filesystem::path(file).parent_path().string();
 }
 
 template <class Entry>
@@ -190,7 +206,8 @@ std::string to_text(const ParameterValue& value) {
   return std::visit(
       [](const auto& held) -> std::string {
         using Held = std::decay_t<decltype(held)>;
-        if constexpr (std::is_same_v<Held, std::vector<Real>> || std::is_same_v<Held, std::array<Real, 3>>)
+        if constexpr (std::is_same_v<Held, std::vector<Real>> || std::is_same_v<Held, std::array<Real, 3>> ||
+                      std::is_same_v<Held, std::vector<std::string>>)
           return fmt::format("{}", fmt::join(held, ","));
         else
           return fmt::format("{}", held);
@@ -199,6 +216,8 @@ std::string to_text(const ParameterValue& value) {
 }
 
 std::string make_label(const std::string& type, const ParameterValues& values, const std::vector<ParameterInfo>& parameters) {
+  if (const auto own = values.find("label"); own != values.end())
+    if (const auto* text = std::get_if<std::string>(&own->second); text && !text->empty()) return *text;
   std::string label = type;
   for (const ParameterInfo& parameter : parameters) {
     const auto at = values.find(parameter.name);
@@ -218,7 +237,9 @@ std::unique_ptr<RaySetSource> make_ray_set(const Component& component) {
   return make<RaySetEntry>(ComponentKind::ray_set, component);
 }
 std::unique_ptr<EstimatorSource> make_estimator(const Component& component) {
-  return make<EstimatorEntry>(ComponentKind::estimator, component);
+  auto source = make<EstimatorEntry>(ComponentKind::estimator, component);
+  source->locate(folder_of(component));
+  return source;
 }
 
 }  // namespace nullmark

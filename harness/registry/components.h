@@ -27,6 +27,7 @@ struct ParameterInfo {
   Range range;                       ///< numbers: range of each
   int low = 0, high = 0;             ///< integer: both included
   std::vector<std::string> allowed;  ///< choice
+  bool object = false;               ///< string: it holds a JSON object
   int least = 0, most = 0;           ///< numbers: how many
 };
 
@@ -44,7 +45,8 @@ bool is_planted(std::string_view estimator);
 /// In declared order.  Throws ParameterError for a type that is not registered.
 std::vector<ParameterInfo> parameters_of(ComponentKind kind, std::string_view type);
 
-/// The type and the parameters that differ from their defaults, in declared order: "residual_ratio/control:average".
+/// The type and the parameters that differ from their defaults, in declared order: "residual_ratio/control:average".  A parameter
+/// "label", which trackers from outside have, is the label itself.
 std::string make_label(const std::string& type, const ParameterValues& values, const std::vector<ParameterInfo>& parameters);
 
 /// "0.5", "true", "1,2,3" or the text itself; the shortest form that gives the same number when read.

@@ -21,6 +21,7 @@ struct EstimatorEntry {
   std::vector<std::pair<const char*, bool>> members;
   std::vector<Quantity> quantities;  ///< quantities that it answers on grey media
   std::unique_ptr<EstimatorSource> (*make)() = nullptr;
+  bool foreign = false;   ///< runs code from outside of nullmark, and says nothing of itself before that is opened
   bool planted = false;   ///< deliberately wrong, for tests; runs if named, is never listed
   std::string caught_by;  ///< planted: the check that must catch it
 };

@@ -127,6 +127,21 @@ std::string remark_lines(const Comparison& comparison) {
   return text;
 }
 
+/// Of trackers in processes of their own: what is theirs of their time.
+std::string seam_lines(const Comparison& comparison) {
+  std::string text;
+  for (const RankedCell& ranked : comparison.cells) {
+    const std::optional<TimeRecord>& time = ranked.record->time;
+    if (time && time->seam_ns_per_sample > 0)
+      text += fmt::format("{}: of {:.4g} ns a sample, {:.4g} are exchanges with its process and {:.4g} its own\n", ranked.label,
+                          time->ns_per_sample, std::min(time->seam_ns_per_sample, time->ns_per_sample),
+                          std::max<Real>(0, time->ns_per_sample - time->seam_ns_per_sample));
+    if (ranked.record->tracker.lookups_told)
+      text += fmt::format("{}: lookups as the tracker tells them, not counted\n", ranked.label);
+  }
+  return text;
+}
+
 std::string baseline_line(const Comparison& comparison) {
   return comparison.baseline ? fmt::format("baseline: {}", comparison.cells[*comparison.baseline].label) : "no baseline here";
 }
@@ -137,7 +152,7 @@ std::string compare_text(const std::vector<RunRecord>& runs, const std::string& 
   std::string text;
   for (const Comparison& comparison : comparisons(runs, baseline)) {
     text += fmt::format("{}\n{}", comparison.name, aligned(ranking(comparison), 2));
-    text += amortised_line(comparison) + unproven_line(comparison) + remark_lines(comparison);
+    text += amortised_line(comparison) + unproven_line(comparison) + seam_lines(comparison) + remark_lines(comparison);
     if (paired && !comparison.pairings.empty()) text += aligned(pairs(comparison), 1);
     if (paired) text += not_paired(comparison);
     text += baseline_line(comparison) + "\n\n";
@@ -154,7 +169,7 @@ std::string compare_markdown(const std::vector<RunRecord>& runs, const std::stri
     // A line that begins with a star would be a list.
     const std::string unproven = unproven_line(comparison);
     for (const std::string& line :
-         {amortised_line(comparison), unproven.empty() ? "" : "\\" + unproven, remark_lines(comparison)})
+         {amortised_line(comparison), unproven.empty() ? "" : "\\" + unproven, seam_lines(comparison), remark_lines(comparison)})
       if (!line.empty()) text += markdown_cell(line) + "\n";
     if (paired && !comparison.pairings.empty()) text += markdown_table(pairs(comparison)) + "\n";
     if (paired && !comparison.unpaired.empty()) text += markdown_cell(not_paired(comparison)) + "\n";

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "harness/config/component_reader.h"
 #include "harness/config/config.h"
 #include "harness/io/spec_json.h"
 #include "harness/model/names.h"
@@ -138,12 +139,17 @@ Json experiment_of(Quantity quantity, const SceneGroup& group, const Json& estim
 
 Json battery_json(const Json& estimator, const Json& medium, bool quick) {
   const EstimatorEntry& entry = entry_of(type_of(estimator));
-  const std::unique_ptr<EstimatorSource> source = entry.make();
+  // What a tracker from outside is, only its parameters tell.
+  const std::unique_ptr<EstimatorSource> source =
+      entry.foreign ? make_estimator(read_components(ComponentKind::estimator, JsonNode(estimator, "prove")).front())
+                    : entry.make();
+  const std::unique_ptr<const Kernel> opened = entry.foreign ? source->kernel(1) : nullptr;
   const auto of_use = [&](When when) {
     return when == When::always || (when == When::in_lanes ? entry.in_lanes : !source->needs_bound());
   };
   Json experiments = Json::array();
   for (const Quantity quantity : entry.quantities) {
+    if (opened && !opened->answers(quantity)) continue;
     if (source->claim(quantity) == Guarantee::biased || quantity == Quantity::radiance) continue;
     for (const SceneGroup& group : kGroups)
       if (of_use(group.when) && (medium.is_null() || &group == kGroups))

@@ -102,6 +102,10 @@ void add_convergence(CellRecord& record, const std::vector<GroupErrors::Level>& 
   }
 }
 
+TrackerRecord tracker_record(const TrackerIdentity& identity) {
+  return {identity.name, identity.version, hash_text(identity), identity.tells_lookups, !identity.repeatable};
+}
+
 }  // namespace
 
 CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
@@ -113,9 +117,14 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
   record.majorant = plan.majorants[cell.majorant];
   record.ray_set = plan.ray_sets[cell.rays];
   const auto* entry = Registry<EstimatorEntry>::instance().find(cell.estimator.type);
-  record.claims = to_string(make_estimator(cell.estimator)->claim(cell.quantity));
-  record.range = to_string(entry->range);
-  record.order = make_estimator(cell.estimator)->order(cell.quantity);
+  std::shared_ptr<const EstimatorSource> source = prepared.source;
+  if (!source && !entry->foreign) source = make_estimator(cell.estimator);
+  if (source) {
+    record.claims = to_string(source->claim(cell.quantity));
+    record.range = to_string(entry->foreign ? prepared.range : entry->range);
+    record.order = source->order(cell.quantity);
+    if (const auto identity = source->identity()) record.tracker = tracker_record(*identity);
+  }
   if (prepared.scene) {
     record.channels = prepared.scene->medium->medium->channels();
     record.rays = prepared.scene->rays->world.size();
@@ -123,8 +132,8 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
     record.medium_hash = hash_text(*prepared.scene->medium);
     if (record.channels > 1) record.effects.push_back("chromatic");
     if (cell.quantity == Quantity::radiance) record.effects = prepared.effects;
-    if (const auto alone = make_estimator(cell.estimator)->kernel(record.channels, cell.precision))
-      record.given_depth = alone->needs_optical_depth();
+    if (source && !entry->foreign)
+      if (const auto alone = source->kernel(record.channels, cell.precision)) record.given_depth = alone->needs_optical_depth();
     record.in_lanes = prepared.kernel && prepared.kernel->in_lanes(cell.quantity);
     if (!prepared.takes_part) record.reason = "constant extinction: closed-form flights, the estimator takes no part";
   }

@@ -168,6 +168,17 @@ std::vector<std::string> output_names(const PreparedCell& cell) {
   return names;
 }
 
+void expect_same_tracker(const CellRecord& record, const PreparedCell& cell, const std::string& file) {
+  const auto identity = cell.source ? cell.source->identity() : std::nullopt;
+  if (!identity) return;
+  if (!identity->repeatable)
+    throw InputError(fmt::format("{}: \"{}\": the tracker {} says that its samples cannot be drawn again", file, record.cell.name,
+                                 identity->name));
+  if (const std::string hash = hash_text(*identity); hash != record.tracker.hash)
+    throw InputError(fmt::format("{}: \"{}\": the tracker's code has changed since (hash {}, now {}); run it again", file,
+                                 record.cell.name, record.tracker.hash, hash));
+}
+
 }  // namespace
 
 Replay replay_sample(const RunRecord& run, const std::string& file, const std::string& name, const SampleChoice& wanted) {
@@ -181,6 +192,7 @@ Replay replay_sample(const RunRecord& run, const std::string& file, const std::s
   if (const std::string hash = fmt::format("{:016x}", cell.scene->medium->hash); hash != record.medium_hash)
     throw InputError(fmt::format("{}: \"{}\": the medium's data have changed since (hash {}, now {}); run it again", file, name,
                                  record.medium_hash, hash));
+  expect_same_tracker(record, cell, file);
   const std::size_t rays = cell.scene->rays->world.size();
   if (wanted.ray && *wanted.ray >= rays)
     throw InputError(fmt::format("--ray: found {}; the rays of \"{}\" are 0 to {}", *wanted.ray, name, rays - 1));

@@ -190,6 +190,20 @@ void expect_same_media(CellPreparer& preparer, const Plan& plan, const Records& 
   }
 }
 
+/// Throws InputError where a finished cell was sampled with other code of a tracker from outside than there is now.
+void expect_same_trackers(CellPreparer& preparer, const Records& finished) {
+  for (const auto& [index, record] : finished) {
+    if (record.tracker.hash.empty()) continue;
+    const PreparedCell now = preparer.prepare(index);
+    const auto identity = now.source ? now.source->identity() : std::nullopt;
+    if (!identity || hash_text(*identity) == record.tracker.hash) continue;
+    throw InputError(
+        fmt::format("cell \"{}\": found the tracker {} of hash {}; expected {}, as when the cell was sampled: its code was "
+                    "replaced; --force runs all cells again",
+                    record.cell.name, record.tracker.name, hash_text(*identity), record.tracker.hash));
+  }
+}
+
 }  // namespace
 
 std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selected,
@@ -226,6 +240,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
   const bool timing = options.timing && plan.timing.enabled;
   CellPreparer preparer(plan);
   expect_same_media(preparer, plan, records);
+  expect_same_trackers(preparer, records);
   std::vector<PreparedCell> cells = prepare_all(
       preparer, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); }, ended);
   // Statistics of a resumed run stand; a run that was stopped before or while timing still owes the times.

@@ -73,11 +73,17 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
 /// The tracker of a cell whose scene is built.
 void CellPreparer::add_kernel(PreparedCell& prepared) {
   const Cell& cell = *prepared.cell;
-  const auto source = located(cell.estimator.pointer, [&] { return make_estimator(cell.estimator); });
+  const std::shared_ptr<const EstimatorSource> source =
+      located(cell.estimator.pointer, [&] { return make_estimator(cell.estimator); });
   located(cell.estimator.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
-  prepared.claim = source->claim(cell.quantity);
-  prepared.range = source->range(prepared.scene->medium->medium->channels());
-  prepared.needs_bound = source->needs_bound();
+  // A tracker from outside is opened here.
+  located(cell.estimator.pointer, [&] {
+    prepared.claim = source->claim(cell.quantity);
+    prepared.range = source->range(prepared.scene->medium->medium->channels());
+    prepared.needs_bound = source->needs_bound();
+    return 0;
+  });
+  prepared.source = source;
   if (cell.quantity == Quantity::radiance && cell.precision == Precision::float64) {
     add_light(prepared, *source);
   } else {

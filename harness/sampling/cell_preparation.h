@@ -16,6 +16,7 @@ struct PreparedCell {
   const Cell* cell = nullptr;
   std::size_t index = 0;
   std::shared_ptr<const Scene> scene;
+  std::shared_ptr<const EstimatorSource> source;  ///< null if nothing of the estimator was built
   std::shared_ptr<const Kernel> kernel;
   std::string reason, failure;
   std::vector<std::string> effects;  ///< of a radiance kernel

@@ -6,6 +6,8 @@
 #include <exception>
 #include <string>
 
+#include "harness/kernel/tracker_failure.h"
+
 namespace nullmark {
 
 /// What `f` threw, as one line; empty if nothing.  Exceptions that are `Passed` are thrown on: they are of the harness.
@@ -16,7 +18,8 @@ std::string failure_of(F&& f) {
     f();
   } catch (const std::exception& error) {
     if ((dynamic_cast<const Passed*>(&error) || ...)) throw;
-    failure = fmt::format("the tracker threw: {}", error.what());
+    const bool told = dynamic_cast<const TrackerFailure*>(&error);
+    failure = told ? error.what() : fmt::format("the tracker threw: {}", error.what());
   } catch (...) {
     failure = "the tracker threw what is no std::exception";
   }

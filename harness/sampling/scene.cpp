@@ -105,6 +105,7 @@ BuiltMedium build_medium(const MediumSpec& spec) {
 }
 
 std::string hash_text(const BuiltMedium& medium) { return fmt::format("{:016x}", medium.hash); }
+std::string hash_text(const TrackerIdentity& tracker) { return fmt::format("{:016x}", tracker.hash); }
 
 BuiltMajorant build_majorant(const Component& spec, const BuiltMedium& medium) {
   const auto source = make_majorant(spec);

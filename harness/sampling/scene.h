@@ -26,6 +26,8 @@ Spectrum per_channel(const std::vector<Real>& values, int channels, const char* 
 /// Its hash as records tell it, 16 hexadecimal digits.
 std::string hash_text(const BuiltMedium& medium);
 
+std::string hash_text(const TrackerIdentity& tracker);
+
 /// Builds a specification: the field, times its spectrum or one per channel.  Throws ParameterError or MissingData.
 BuiltMedium build_medium(const MediumSpec& spec);
 

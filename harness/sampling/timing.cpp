@@ -31,6 +31,7 @@ std::vector<std::size_t> timed_rays(const BuiltRays& rays) {
 struct Repetition {
   Real ns_per_iteration = 0, samples = 0, lookups = 0;
   Real waiting = 0;  ///< see waiting_share
+  Real seam = 0;     ///< nanoseconds of exchanges with a process
 };
 
 /// Google Benchmark 1.8 renamed `error_occurred` to `skipped`.
@@ -54,7 +55,8 @@ class Collector final : public benchmark::BenchmarkReporter {
       const auto iterations = static_cast<Real>(run.iterations);
       all[run.run_name.function_name].push_back({run.real_accumulated_time / iterations * 1e9,
                                                  run.counters.at("samples") / iterations, run.counters.at("lookups") / iterations,
-                                                 waiting_share(run.real_accumulated_time, run.cpu_accumulated_time)});
+                                                 waiting_share(run.real_accumulated_time, run.cpu_accumulated_time),
+                                                 seam(run) / iterations * 1e9});
       progress_(static_cast<double>(++seen_) / static_cast<double>(expected_));
     }
   }
@@ -62,6 +64,11 @@ class Collector final : public benchmark::BenchmarkReporter {
   std::map<std::string, std::vector<Repetition>> all;
 
  private:
+  static Real seam(const Run& run) {
+    const auto told = run.counters.find("seam");
+    return told == run.counters.end() ? 0 : static_cast<Real>(told->second);
+  }
+
   std::function<void(double)> progress_;
   std::size_t expected_, seen_ = 0;
 };
@@ -122,6 +129,7 @@ void run_cell(benchmark::State& state, const TimedCell& timed, const std::vector
   }
   state.counters["samples"] = static_cast<double>(counters.samples);
   state.counters["lookups"] = static_cast<double>(counters.lookups);
+  state.counters["seam"] = timed.kernel->seam_seconds(*workspace);
 }
 
 const std::string kLoopName = "loop";
@@ -225,9 +233,13 @@ std::optional<TimeRecord> time_record(const TimedCell& cell, std::size_t index, 
     for (const std::uint64_t samples : plan.samples_per_traversal)
       if (const auto& of_batch = all[batch_name(index, samples)]; of_batch.size() == whole)
         time.batches.push_back(batch_time(samples, sample_times(of_batch)));
-  std::vector<Real> waiting;
-  for (const Repetition& repetition : repetitions) waiting.push_back(repetition.waiting);
+  std::vector<Real> waiting, seam;
+  for (const Repetition& repetition : repetitions) {
+    waiting.push_back(repetition.waiting);
+    seam.push_back(repetition.seam / repetition.samples);
+  }
   time.waiting = median(waiting);
+  time.seam_ns_per_sample = median(seam);
   time.ns_per_lookup = median_per_lookup(repetitions);
   const auto ratio = [&](const std::string& to) {
     const Real ns = median_per_lookup(all[to]);

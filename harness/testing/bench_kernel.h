@@ -16,11 +16,11 @@ class KernelBench {
  public:
   /// Throws ParameterError where estimator, medium and majorant do not fit each other.
   KernelBench(const Component& estimator, std::shared_ptr<const Medium> medium, const Component& majorant,
-              const Ray& world = {{0, 0.5, 0.5}, {1, 0, 0}, 0, 1}, Precision precision = Precision::float64)
+              const Ray& world = {{0, 0.5, 0.5}, {1, 0, 0}, 0, 1}, Precision precision = Precision::float64, bool lanes = true)
       : medium_(std::move(medium)), extrema_(medium_->extrema(medium_->bounds())) {
     const auto source = make_estimator(estimator);
     source->check(extrema_);
-    kernel_ = source->kernel(medium_->channels(), precision);
+    kernel_ = source->kernel(medium_->channels(), precision, lanes);
     if (!kernel_) throw ParameterError("", "no form in this precision");
     workspace_ = kernel_->workspace();
     const Ray local = clipped(transformed(world, medium_->world_to_local()), medium_->bounds());

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/sampling/pilot_size.h"
 #include "harness/verdict/counted_lookups.h"
 #include "harness/verdict/free_path_law.h"
 #include "harness/verdict/replay_law.h"
@@ -21,14 +22,16 @@ Real lookups_of_a_sample(const Sampled& sampled) {
 
 /// Variances from samples of their own, where theory has none; some of them are kept.
 std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSamples>& kept, const std::function<bool()>& stop) {
-  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                                   {.first = first_sample::kPilot, .per_ray = prepared.samples_per_ray, .keep = true}, nullptr,
-                                   stop, [](double) {});
-  if (!sampled || prepared.samples_per_ray < 2) return std::nullopt;
+  const std::uint64_t per_ray = pilot_size(prepared);
+  if (per_ray < 2) return std::nullopt;
+  const auto sampled =
+      sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
+                  {.first = first_sample::kPilot, .per_ray = per_ray, .keep = true}, nullptr, stop, [](double) {});
+  if (!sampled) return std::nullopt;
   if (sampled->counters.overruns == 0) kept.push_back(sampled->kept);
   Pilot pilot;
   const std::size_t outputs = prepared.targets.outputs;
-  const auto n = static_cast<Real>(prepared.samples_per_ray);
+  const auto n = static_cast<Real>(per_ray);
   std::vector<Real> second(outputs), fourth(outputs), raw(outputs);  // central moments, summed over the rays
   for (std::size_t i = 0; i < sampled->moments.size(); ++i) {
     const Moments& x = sampled->moments[i];
@@ -86,6 +89,11 @@ std::vector<LawRecord> laws_of(const PreparedCell& prepared, const TestPlan& pla
     // Without a bound above, samples not seen could make up for any variance that was stated too large.
     laws.push_back({std::isfinite(plan.high) ? "variance" : "variance from below", std::round(log_mean_exp(logs) * 1e4) / 1e4,
                     sampled.counters.samples, Outcome::none});
+  }
+  const auto identity = prepared.source ? prepared.source->identity() : std::nullopt;
+  if (identity && !identity->repeatable) {
+    untested.push_back("replay: the tracker says that its samples cannot be drawn again");
+    return laws;
   }
   if (const LawRecord law = replay_law(prepared.planned(), *prepared.scene, *prepared.kernel, kept, stop); law.samples > 0)
     laws.push_back(law);

@@ -35,6 +35,10 @@ class ParameterVisitor {
   virtual void text(const char* name, std::string& value, const char* text) = 0;
   virtual void numbers(const char* name, std::vector<Real>& value, int least, int most, Range range, const char* unit,
                        const char* text) = 0;
+  /// Words in order, such as those of a command.
+  virtual void texts(const char* name, std::vector<std::string>& value, const char* text) = 0;
+  /// A JSON object, as text.
+  virtual void object(const char* name, std::string& value, const char* text) = 0;
   virtual void point(const char* name, Vec3& value, const char* unit, const char* text) = 0;
 };
 

@@ -20,6 +20,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "media/base/own_executable.h"
 #include "media/base/registry.h"
 #include "media/volumes/flat_volume.h"
 #include "media/volumes/machine_memory.h"
@@ -125,14 +126,6 @@ class Answer {
   std::size_t size_ = 0;
 };
 
-/// Where this executable lies; once a newer one has taken that place, the one that runs.
-std::string own_path() {
-  const char* const running = "/proc/self/exe";
-  std::error_code error;
-  const std::string named = std::filesystem::read_symlink(running, error).string();
-  return !error && ::access(named.c_str(), X_OK) == 0 ? named : running;
-}
-
 /// The error number of the start, or 0 and how the process ended.
 int run_reader(const std::string& file, const std::string& grid, const Limits& limits, int answer, int& status) {
   posix_spawn_file_actions_t files;
@@ -156,7 +149,7 @@ int run_reader(const std::string& file, const std::string& grid, const Limits& l
   ::posix_spawnattr_setsigdefault(&attributes, &defaults);
   ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
 
-  const std::string path = own_path();
+  const std::string path = own_executable();
   std::array<std::string, 7> words{path,
                                    kCommand,
                                    file,

@@ -51,33 +51,18 @@ Real density(std::uint64_t seed, const Vec3& p) {
   return std::clamp<Real>(2.5 * (envelope + sum - 0.8), 0, 1);
 }
 
-}  // namespace
-
-void write_procedural_vdb(const std::string& path, const ProceduralVdb& options) {
-  constexpr int kLargest = 1024;
-  const int n = options.resolution;
-  if (n < 8 || n > kLargest) throw ParameterError("resolution", fmt::format("{} voxels across; expected 8 to {}", n, kLargest));
+void initialize_openvdb() {
   static std::once_flag initialized;
   std::call_once(initialized, openvdb::initialize);
+}
 
-  const int lo = -(n / 2);
-  openvdb::tools::Dense<float> dense(openvdb::CoordBBox(openvdb::Coord(lo), openvdb::Coord(lo + n - 1)));
-  tbb::parallel_for(0, n, [&](int i) {
-    for (int j = 0; j < n; ++j)
-      for (int k = 0; k < n; ++k) {
-        const Vec3 p = (2 * Vec3(i, j, k) - Vec3::Constant(n - 1)) / n;
-        dense.setValue(openvdb::Coord(lo + i, lo + j, lo + k), static_cast<float>(density(options.seed, p)));
-      }
-  });
-
-  const auto grid = openvdb::FloatGrid::create(0);
-  openvdb::tools::copyFromDense(dense, *grid, 0.f);
+/// Beside the path, then renamed.
+void write_grid(const std::string& path, const openvdb::FloatGrid::Ptr& grid, const Affine& index_to_world) {
   grid->setName("density");
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
-  grid->setSaveFloatAsHalf(options.half);
   openvdb::Mat4d matrix = openvdb::Mat4d::identity();
   for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) matrix(column, row) = options.index_to_world(row, column);
+    for (int column = 0; column < 4; ++column) matrix(column, row) = index_to_world(row, column);
 
   const std::string temporary = fmt::format("{}.{}.tmp", path, ::getpid());
   try {
@@ -93,6 +78,44 @@ void write_procedural_vdb(const std::string& path, const ProceduralVdb& options)
     std::filesystem::remove(temporary, ignored);
     throw ParameterError("file", fmt::format("{}: cannot write the volume: {}", path, error.what()));
   }
+}
+
+}  // namespace
+
+void write_procedural_vdb(const std::string& path, const ProceduralVdb& options) {
+  constexpr int kLargest = 1024;
+  const int n = options.resolution;
+  if (n < 8 || n > kLargest) throw ParameterError("resolution", fmt::format("{} voxels across; expected 8 to {}", n, kLargest));
+  initialize_openvdb();
+
+  const int lo = -(n / 2);
+  openvdb::tools::Dense<float> dense(openvdb::CoordBBox(openvdb::Coord(lo), openvdb::Coord(lo + n - 1)));
+  tbb::parallel_for(0, n, [&](int i) {
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; k < n; ++k) {
+        const Vec3 p = (2 * Vec3(i, j, k) - Vec3::Constant(n - 1)) / n;
+        dense.setValue(openvdb::Coord(lo + i, lo + j, lo + k), static_cast<float>(density(options.seed, p)));
+      }
+  });
+
+  const auto grid = openvdb::FloatGrid::create(0);
+  openvdb::tools::copyFromDense(dense, *grid, 0.f);
+  grid->setSaveFloatAsHalf(options.half);
+  write_grid(path, grid, options.index_to_world);
+}
+
+void write_dense_vdb(const std::string& path, const Index3& shape, std::span<const float> values, const Affine& index_to_world) {
+  initialize_openvdb();
+  const openvdb::Coord last(shape[0] - 1, shape[1] - 1, shape[2] - 1);
+  openvdb::tools::Dense<float, openvdb::tools::LayoutXYZ> dense(openvdb::CoordBBox(openvdb::Coord(0), last));
+  std::copy(values.begin(), values.end(), dense.data());
+  const auto grid = openvdb::FloatGrid::create(0);
+  openvdb::tools::copyFromDense(dense, *grid, 0.f);
+  // What is 0 is background.  The active box is what bounds the medium, so its corners are active whatever they hold.
+  auto accessor = grid->getAccessor();
+  accessor.setValueOn(openvdb::Coord(0), values.front());
+  accessor.setValueOn(last, values.back());
+  write_grid(path, grid, index_to_world);
 }
 
 }  // namespace nullmark

@@ -1,9 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 
-#include "media/base/types.h"
+#include "media/volumes/brick_grid.h"
 
 namespace nullmark {
 
@@ -19,5 +20,9 @@ struct ProceduralVdb {
 /// Its saturated core becomes active tiles, what is outside stays background 0.  Voxels depend on the options alone.  zlib where
 /// OpenVDB has it, else blosc; written beside the path, then renamed.  Throws ParameterError for "resolution" or "file".
 void write_procedural_vdb(const std::string& path, const ProceduralVdb& options = {});
+
+/// Writes a fog volume "density" of voxels 0 <= index < shape, x fastest: values[(z * shape[1] + y) * shape[0] + x].  Its active
+/// box is all of them, its background 0.  Throws ParameterError for "file".
+void write_dense_vdb(const std::string& path, const Index3& shape, std::span<const float> values, const Affine& index_to_world);
 
 }  // namespace nullmark

@@ -26,6 +26,7 @@ TEST(Corpus, Config) { replay("config", fuzz_config); }
 TEST(Corpus, Results) { replay("results", fuzz_results); }
 TEST(Corpus, Merge) { replay("merge", fuzz_merge); }
 TEST(Corpus, FlatVolume) { replay("flat_volume", fuzz_flat_volume); }
+TEST(Corpus, Frames) { replay("frames", fuzz_frames); }
 // Intact seeds alone: what damaged files do to OpenVDB is contained, not mended.
 TEST(Corpus, Vdb) { replay("vdb", fuzz_vdb); }
 
