@@ -89,6 +89,7 @@ class ForeignKernel final : public Kernel {
       const std::size_t n = std::min(tracker_->block, count - done);
       const std::span<std::uint32_t> lookups(&out.lookups[done], n);
       if (!draw(state, key, first + done, quantity, told, lookups, counters)) return;
+      if (told.range == SampleRange::binary) expect_binary(state.result.value);
       score(state, context, quantity, {&out.values[done * outputs], n * outputs}, outputs);
     }
   }
@@ -130,6 +131,13 @@ class ForeignKernel final : public Kernel {
       lookups[k] = static_cast<std::uint32_t>(std::min<std::uint64_t>(state.result.lookups[k], state.most_lookups));
     state.host.end_block();
     return true;
+  }
+
+  /// Bets on coins rest on it.
+  static void expect_binary(const std::vector<double>& values) {
+    for (const double value : values)
+      if (std::isfinite(value) && value != 0 && value != 1)
+        throw TrackerFailure(fmt::format("the tracker states that its samples are 0 or 1, and one is {}", value));
   }
 
   void score(State& state, const PreparedRay& context, Quantity quantity, std::span<Real> values, std::size_t outputs) const {

@@ -142,6 +142,15 @@ TEST(Foreign, FaultsOfALibraryEndTheirCell) {
   EXPECT_EQ(failure(library(NULLMARK_TRACKERS_LIBRARY, "ratio", R"("isolate":true,"parameters":{"fault":"prints"})")), "ok");
 }
 
+TEST(Foreign, FractionsAreNoCoins) {
+  // Ratio tracking that calls itself binary would be bet on like a coin.
+  const CellRecord record = run(library(NULLMARK_TRACKERS_LIBRARY, "ratio", R"("parameters":{"fault":"binary"})"), R"("linear")",
+                                R"([{"type":"global","looseness":2}])")
+                                .at(0);
+  EXPECT_EQ(record.status, Status::error);
+  EXPECT_NE(record.reason.find("states that its samples are 0 or 1, and one is "), std::string::npos) << record.reason;
+}
+
 TEST(Foreign, SamplesThatContradictTheirDescriptionFail) {
   const auto verdict_of = [](const char* fault) {
     return run(library(NULLMARK_TRACKERS_LIBRARY, "ratio", fmt::format(R"("parameters":{{"fault":"{}"}})", fault)), R"("linear")",

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <mutex>
 
@@ -11,6 +12,7 @@
 #include "harness/foreign/printable.h"
 #include "harness/io/json_input.h"
 #include "harness/io/npy.h"
+#include "harness/model/names.h"
 #include "harness/registry/estimator_entry.h"
 
 namespace nullmark {
@@ -81,13 +83,30 @@ struct Spread {
 
 }  // namespace
 
-std::shared_ptr<const GivenSamples> read_samples(const std::string& path) {
+namespace {
+
+/// Whether a number may be a sample, the rounding of floats allowed for.
+bool may_be_sample(Real number, SampleRange range) {
+  constexpr Real kSlack = 1e-6;
+  if (!std::isfinite(number)) return false;
+  if (range == SampleRange::any_sign) return true;
+  if (range == SampleRange::binary) return number == 0 || number == 1;
+  return number >= -kSlack && (range == SampleRange::non_negative || number <= 1 + kSlack);
+}
+
+}  // namespace
+
+std::shared_ptr<const GivenSamples> read_samples(const std::string& path, SampleRange range) {
   const NpyHeader header = read_npy_header(path);
   const SampleShape shape = shape_of(header, path);
   expect_memory(header, path);
   auto samples = std::make_shared<GivenSamples>(static_cast<std::size_t>(shape.rays), static_cast<std::size_t>(shape.channels),
                                                 shape.samples, header.bytes_per_number == sizeof(float));
   for_each_number(path, header, shape, [&](std::uint64_t sample, std::size_t ray, std::size_t channel, Real number) {
+    // The pilot's samples are held to it as well, or a file that is half wrong could pass.
+    if (!may_be_sample(number, range))
+      throw InputError(fmt::format("{}: sample {} of ray {} is {}; expected {}", path, sample, ray, number,
+                                   std::isfinite(number) ? fmt::format("the stated range, {}", to_string(range)) : "a number"));
     samples->set(ray, sample, channel, number);
   });
   return samples;
@@ -155,7 +174,7 @@ class SamplesSource final : public EstimatorSource {
     if (file_.empty()) throw ParameterError("file", "missing; expected the path of an .npy file");
     const std::string path = (std::filesystem::path(folder_) / file_).string();
     try {
-      samples_ = read_samples(path);
+      samples_ = read_samples(path, range_named(range_));
     } catch (const InputError& error) {
       throw ParameterError("file", error.what());
     }

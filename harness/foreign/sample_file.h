@@ -26,7 +26,8 @@ SampleShape read_sample_shape(const std::string& path);
 /// it is most: about 1 where they are.  1 where nothing varies.
 Real shared_variance(const std::string& path);
 
-/// Reads all samples.  Throws InputError of one line, also where they would not fit into the machine's memory.
-std::shared_ptr<const GivenSamples> read_samples(const std::string& path);
+/// Reads all samples.  Throws InputError of one line, also where they would not fit into the machine's memory, and for a sample
+/// that is not finite or not of the range.
+std::shared_ptr<const GivenSamples> read_samples(const std::string& path, SampleRange range = SampleRange::any_sign);
 
 }  // namespace nullmark

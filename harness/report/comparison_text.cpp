@@ -133,9 +133,11 @@ std::string seam_lines(const Comparison& comparison) {
   for (const RankedCell& ranked : comparison.cells) {
     const std::optional<TimeRecord>& time = ranked.record->time;
     if (time && time->seam_ns_per_sample > 0)
-      text += fmt::format("{}: of {:.4g} ns a sample, {:.4g} are exchanges with its process and {:.4g} its own\n", ranked.label,
-                          time->ns_per_sample, std::min(time->seam_ns_per_sample, time->ns_per_sample),
-                          std::max<Real>(0, time->ns_per_sample - time->seam_ns_per_sample));
+      text += fmt::format(
+          "{}: of {:.4g} ns a sample, {:.4g} are exchanges with its process and {:.4g} its own; {} samples share an exchange, "
+          "set by samples_per_traversal\n",
+          ranked.label, time->ns_per_sample, std::min(time->seam_ns_per_sample, time->ns_per_sample),
+          std::max<Real>(0, time->ns_per_sample - time->seam_ns_per_sample), time->samples_per_traversal);
     if (ranked.record->tracker.lookups_told)
       text += fmt::format("{}: lookups as the tracker tells them, not counted\n", ranked.label);
   }

@@ -26,7 +26,10 @@ static void ratio_destroy(void* self) {
 }
 
 static int32_t ratio_create(const char* parameters, void** self, char* error, int64_t error_size) {
-  (void)parameters, (void)error, (void)error_size;
+  if (strcmp(parameters, "{}") != 0) {
+    strncpy(error, "it takes none", (size_t)error_size);
+    return NULLMARK_ERROR;
+  }
   *self = calloc(1, sizeof(ratio_state));
   return *self ? NULLMARK_OK : NULLMARK_ERROR;
 }

@@ -12,6 +12,8 @@ from pathlib import Path
 from .serving import Loaded
 from .tracker import Tracker
 
+# Blocks as large as those of sampling: in smaller ones a process would be timed waiting.
+_TIMING = {"samples_per_traversal": 4096}
 _PACKAGE = Path(__file__).resolve().parent
 
 
@@ -187,7 +189,7 @@ def judge(*trackers, media=("cosine",), majorants=("global",), rays="single", qu
     }
     with tempfile.TemporaryDirectory() as folder:
         config, made = Path(folder) / "judge.json", Path(folder) / "results.json"
-        config.write_text(json.dumps({"nullmark": "config/2", "name": "judge", "experiments": [experiment]}))
+        config.write_text(json.dumps({"nullmark": "config/2", "name": "judge", "timing": _TIMING, "experiments": [experiment]}))
         words = [] if timing else ["--no-timing"]
         _run("run", str(config), "-o", str(made), "--allow-foreign", "--threads", str(threads), *words, accept=(0, 1, 5))
         if output:

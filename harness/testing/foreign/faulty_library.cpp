@@ -40,6 +40,7 @@ std::int32_t describe(void* state, std::int32_t, std::int32_t, nullmark_descript
   out->guarantee = NULLMARK_UNBIASED;
   out->range = NULLMARK_UNIT;
   if (static_cast<State*>(state)->fault == "describe") out->range = 9;
+  if (static_cast<State*>(state)->fault == "binary") out->range = NULLMARK_BINARY;
   return NULLMARK_OK;
 }
 

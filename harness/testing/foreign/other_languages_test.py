@@ -165,7 +165,7 @@ class Trackers(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("rustc"), "no rustc")
     def test_rust(self):
-        source = REPOSITORY / "harness" / "testing" / "foreign" / "ratio.rs"
+        source = REPOSITORY / "harness" / "foreign" / "example" / "ratio.rs"
         for cfg, code in (([], 0), (["--cfg", "slip"], 3)):
             library = self.folder / f"lib{code}.so"
             subprocess.run(["rustc", "--crate-type", "cdylib", "-O", *cfg, "-o", library, source], check=True, capture_output=True)
