@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "harness/analysis/comparison_test.h"
 #include "harness/io/json_input.h"
 #include "harness/report/comparison_text.h"
 #include "harness/statistics/moments.h"
@@ -13,31 +14,7 @@
 namespace nullmark {
 namespace {
 
-/// A cell of one ray with 100 samples: reference .5, variance .04, 10 ns a sample.
-CellRecord cell(const std::string& estimator, Real variance = 0.04, Real ns = 10) {
-  CellRecord record;
-  record.cell.estimator.type = record.cell.estimator.label = estimator;
-  record.cell.samples_per_ray = 100;
-  record.claims = "unbiased";
-  record.status = Status::ok;
-  record.rays = 1;
-  record.samples = 100;
-  record.lookups_per_sample = 2;
-  ChannelRecord channel;
-  channel.reference = channel.reference_rms = 0.5;
-  channel.variance_theory = variance;
-  record.channel = {channel};
-  record.time = TimeRecord{};
-  record.time->repetition_ns = {ns * 0.99, ns, ns * 1.01};
-  return record;
-}
-
-CellRecord marching(Real floor, Real variance = 0, Real ns = 20) {
-  CellRecord record = cell("ray_marching", variance, ns);
-  record.claims = "consistent";
-  record.channel[0].rmse = std::sqrt(floor * floor * 0.25 + variance / 100);
-  return record;
-}
+using namespace comparison_test;
 
 Comparison only_comparison(const std::vector<CellRecord>& cells, const std::string& baseline = "") {
   static std::vector<RunRecord> runs;
@@ -287,17 +264,6 @@ TEST(Compare, TablesTellTiesFloorsAndBreakEven) {
   EXPECT_TRUE(compare_text({}, "", false).empty());
 }
 
-/// A tracker that claims to be unbiased, is twice as fast, and whose verdict says otherwise; its floor is that of `floor`.
-CellRecord disproven(const char* name, Outcome outcome, Real floor) {
-  CellRecord record = cell(name, 0.04, 5);
-  record.channel[0].rmse = std::sqrt(floor * floor * 0.25 + 0.04 / 100);
-  record.verdict.emplace();
-  record.verdict->against = "reference";
-  record.verdict->unbiased = outcome;
-  record.verdict->violated = outcome == Outcome::violated;
-  return record;
-}
-
 TEST(Compare, ATrackerWhoseVerdictIsFailIsNeverTheBaseline) {
   for (const Outcome outcome : {Outcome::fail, Outcome::violated}) {
     const CellRecord wrong = disproven("wrong", outcome, 0.5);
@@ -316,83 +282,6 @@ TEST(Compare, ATrackerWhoseVerdictIsFailIsNeverTheBaseline) {
   const CellRecord right = disproven("right", Outcome::pass, 0);
   EXPECT_EQ(only_comparison({right, cell("ratio")}).cells[0].label, "right");
   EXPECT_EQ(*only_comparison({right, cell("ratio")}).baseline, 0u);
-}
-
-/// A cell whose PASS excludes a bias of `epsilon` of the mean over all rays, and a larger one of a group of them.
-CellRecord passing(Real epsilon) {
-  CellRecord record = cell("ratio");
-  record.verdict.emplace();
-  record.verdict->against = "reference";
-  record.verdict->unbiased = Outcome::pass;
-  TestRecord test;
-  test.basis = "betting";
-  test.reference = 0.5;
-  test.epsilon = epsilon * test.reference;
-  record.verdict->tests = {test, test};
-  record.verdict->tests[1].group = 3;
-  record.verdict->tests[1].epsilon *= 4;
-  return record;
-}
-
-/// The terminal's table of these cells, the stars in it, and whether Markdown says the same.
-struct Shown {
-  explicit Shown(const std::vector<CellRecord>& cells) {
-    std::vector<RunRecord> runs(1);
-    runs[0].cells = cells;
-    text = compare_text(runs, "", false);
-    stars = std::count(text.begin(), text.end(), '*');
-    const std::string markdown = compare_markdown(runs, "", false);
-    EXPECT_EQ(std::count(markdown.begin(), markdown.end(), '*'), stars + 4) << markdown;  // the heading has four
-    EXPECT_EQ(markdown.find("\n* "), std::string::npos) << "a list: " << markdown;
-  }
-  bool has(const std::string& words) const { return text.find(words) != std::string::npos; }
-
-  std::string text;
-  std::ptrdiff_t stars = 0;
-};
-
-TEST(Compare, AnErrorBelowWhatTheVerdictExcludesIsNotProvenToBeReachable) {
-  // One mark, on .1 %, and the line that explains it.
-  const Shown wide({passing(0.01)});
-  EXPECT_EQ(wide.stars, 2) << wide.text;
-  EXPECT_TRUE(wide.has("* not proven to be reachable: PASS excludes a bias above 1 % of the mean, and no smaller one\n"))
-      << wide.text;
-  EXPECT_EQ(Shown({passing(0.02)}).stars, 3);
-  EXPECT_EQ(Shown({passing(0.001)}).stars, 0);
-  const Shown both({passing(0.01), passing(0.05), cell("delta")});
-  EXPECT_TRUE(both.has("above 1 to 5 % of the mean, and no smaller one; without a PASS none is excluded\n")) << both.text;
-}
-
-TEST(Compare, WithoutAPassNoErrorIsProvenToBeReachable) {
-  CellRecord open = passing(0.001), own = open, lawless = open;
-  open.verdict->unbiased = Outcome::inconclusive;
-  // That it has its own mean says nothing about T.
-  own.verdict->against = "own mean";
-  own.verdict->unbiased = Outcome::none;
-  own.verdict->own_mean = Outcome::pass;
-  lawless.verdict->lawful = Outcome::fail;
-  for (const CellRecord& record : {cell("ratio"), open, own, lawless}) {
-    const Shown shown({record});
-    EXPECT_EQ(shown.stars, 3) << shown.text;
-    EXPECT_TRUE(shown.has("* not proven to be reachable: without a PASS no bias is excluded\n")) << shown.text;
-  }
-}
-
-TEST(Compare, ExactTrackersAndMeasuredFloorsNeedNoMark) {
-  CellRecord exact = passing(0.01);
-  exact.claims = "exact";
-  exact.verdict->tests[0].basis = exact.verdict->tests[1].basis = "deterministic";
-  exact.verdict->tests[0].rounding = 1e-12;
-  EXPECT_EQ(Shown({exact}).stars, 0);
-  EXPECT_EQ(Shown({marching(0.0005), marching(0.002), disproven("wrong", Outcome::fail, 0.5)}).stars, 0);
-}
-
-/// The unbiased tracker is cheaper from there on only if it reaches the error of both.
-TEST(Compare, ABreakEvenBelowWhatTheVerdictExcludesIsMarked) {
-  const Shown wide({passing(0.01), marching(0.0005)}), narrow({passing(0.0001), marching(0.0005)});
-  EXPECT_TRUE(wide.has(" s, at 0.05 %*")) << wide.text;
-  EXPECT_TRUE(narrow.has(" s, at 0.05 %")) << narrow.text;
-  EXPECT_EQ(narrow.stars, 0) << narrow.text;
 }
 
 TEST(Compare, CellsWithTheSameSamplesAndWalksInLanesAreRemarkedOn) {

@@ -47,11 +47,7 @@ ExitCode tell_verdict(const JudgeCommand& command, const Plan& plan, std::vector
   RunContext context;
   context.command_line = command.command_line;
   context.selected = 1;
-  RunRecord run;
-  run.cells = std::move(cells);
-  run.name = plan.name;
-  run.config_text = plan.config_text;
-  run.provenance = make_provenance(context, std::chrono::system_clock::now());
+  RunRecord run = make_run_record(plan, std::move(cells), context);
   const Summary summary = summarise(run);
   fmt::print("{}", summary_text(run, summary));
   if (summary.exit == ExitCode::inconclusive) fmt::print("{}\n", advice(command, samples));

@@ -66,11 +66,7 @@ ExitCode run_battery(const ProveCommand& command, const Battery& battery, const 
   observer.warning = [&](const std::string& message) { progress->warning(message); };
   return watched_run(battery.plan, battery.selected, {}, options, observer, [&](std::vector<CellRecord> records) {
     progress.reset();
-    RunRecord run;
-    run.cells = std::move(records);
-    run.name = battery.plan.name;
-    run.config_text = battery.plan.config_text;
-    run.provenance = make_provenance(context, std::chrono::system_clock::now());
+    RunRecord run = make_run_record(battery.plan, std::move(records), context);
     // Cells that the tracker's parameters do not allow were never to run.
     run.provenance["filter"] = "\"scenes that fit\"";
     return conclude(std::move(run));

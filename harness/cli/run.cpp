@@ -262,13 +262,9 @@ void tell_results(const RunRecord& run, const std::string& output) {
 
 /// To the file, whose journal is done with then, or to standard output where there is no journal.
 ExitCode write_results(const Plan& plan, Earlier cells, const RunContext& context, const std::string& output, Journal* journal) {
-  RunRecord run;
-  run.name = plan.name;
-  run.config_text = plan.config_text;
-  run.provenance = make_provenance(context, std::chrono::system_clock::now());
-  run.tables = plan.tables;
-  run.claims = plan.claims;
-  for (auto& [place, record] : cells) run.cells.push_back(std::move(record));
+  std::vector<CellRecord> records;
+  for (auto& [place, record] : cells) records.push_back(std::move(record));
+  const RunRecord run = make_run_record(plan, std::move(records), context);
   if (journal) {
     write_atomically(output, results_text(run));
     journal->remove();

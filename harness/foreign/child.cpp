@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -231,7 +229,7 @@ Child::Frame Child::receive(std::size_t most_bytes) {
   receive_into(reinterpret_cast<std::byte*>(&header), sizeof header, deadline);
   if (header.kind < FrameKind::hello || header.kind > FrameKind::ping)
     fail(
-        fmt::format("the tracker's process breaks the protocol: found frame {}; expected 1 to 17 (does it print to its standard "
+        fmt::format("the tracker's process breaks the protocol: found frame {}; expected 1 to 16 (does it print to its standard "
                     "output?)",
                     static_cast<std::uint32_t>(header.kind)));
   if (header.sequence != received_)

@@ -1,7 +1,7 @@
 #include "harness/foreign/content_hash.h"
 
 #include <fstream>
-#include <iterator>
+#include <vector>
 
 #include "harness/model/hash.h"
 
@@ -10,8 +10,11 @@ namespace nullmark {
 std::uint64_t content_hash(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return 0;
-  const std::string content{std::istreambuf_iterator<char>(file), {}};
-  return fnv1a(content);
+  std::uint64_t hash = fnv1a("");
+  std::vector<char> part(std::size_t{1} << 16);
+  while (file.read(part.data(), static_cast<std::streamsize>(part.size())) || file.gcount() > 0)
+    hash = fnv1a({part.data(), static_cast<std::size_t>(file.gcount())}, hash);
+  return hash;
 }
 
 }  // namespace nullmark

@@ -61,7 +61,7 @@ TEST_F(ForeignProgram, CommandsThatReadResultsStartNothing) {
   std::filesystem::copy(folder_ / "r.json", folder_ / "s.json");
   for (const char* command :
        {"check r.json", "compare r.json", "report r.json -o r.html", "export r.json --format csv", "export r.json --format jsonl",
-        "replay r.json process/linear/global", "gate --baseline s.json r.json"}) {
+        "replay r.json process/linear/global", "gate --baseline s.json r.json", "merge r.json -o m.json"}) {
     const std::string with_consent = std::string("env NULLMARK_ALLOW_FOREIGN=1 '") + NULLMARK_PROGRAM + "' " + command;
     if (std::string(command).rfind("replay", 0) != 0) {
       const int code = std::system(fmt::format("cd '{}' && {} >out 2>err </dev/null", folder_.string(), with_consent).c_str());
@@ -70,7 +70,7 @@ TEST_F(ForeignProgram, CommandsThatReadResultsStartNothing) {
     run(command);
     EXPECT_FALSE(std::filesystem::exists(folder_ / "started")) << command;
   }
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), before + 2);  // s.json, r.html
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), before + 3);  // s.json, r.html, m.json
 }
 
 TEST_F(ForeignProgram, ShardsAndThreadsMakeTheSameBits) {

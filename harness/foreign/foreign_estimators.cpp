@@ -4,10 +4,10 @@
 #include <mutex>
 
 #include "harness/foreign/consent.h"
+#include "harness/foreign/foreign_entry.h"
 #include "harness/foreign/foreign_kernel.h"
 #include "harness/foreign/library.h"
 #include "harness/foreign/process_tracker.h"
-#include "harness/registry/estimator_entry.h"
 
 namespace nullmark {
 namespace {
@@ -126,14 +126,8 @@ class ProcessSource final : public ForeignSource {
 
 template <class Source>
 bool add() {
-  EstimatorEntry entry;
-  entry.name = Source::kName;
-  entry.summary = Source::kSummary;
-  entry.source = "";
-  entry.quantities = {Quantity::transmittance, Quantity::optical_depth, Quantity::free_path};
-  entry.make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<Source>(); };
-  entry.foreign = true;
-  return Registry<EstimatorEntry>::instance().add(entry);
+  return Registry<EstimatorEntry>::instance().add(
+      foreign_entry<Source>({Quantity::transmittance, Quantity::optical_depth, Quantity::free_path}));
 }
 
 [[maybe_unused]] const bool kRegistered = add<LibrarySource>() && add<ProcessSource>();

@@ -57,8 +57,6 @@ class ForeignKernel final : public Kernel {
   bool states_theory() const override { return tracker_->states_theory; }
   bool answers(Quantity quantity) const override { return tracker_->answers(quantity); }
   bool flies() const override { return false; }
-  bool states_count_law() const override { return false; }
-  std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const override { return {}; }
 
   std::size_t outputs(Quantity quantity, const PreparedRay& context) const override {
     const auto channels = static_cast<std::size_t>(channels_);
@@ -96,10 +94,6 @@ class ForeignKernel final : public Kernel {
 
   Real seam_seconds(const Workspace& workspace) const override {
     return static_cast<const State&>(workspace).session->seam_seconds();
-  }
-
-  Spectrum expected(const Workspace&, const Spectrum& optical_depth, Quantity quantity) const override {
-    return quantity == Quantity::transmittance ? Spectrum((-optical_depth).exp()) : optical_depth;
   }
 
   std::vector<Theory> theory(const Workspace& workspace, const RayProfile&, Quantity quantity) const override {

@@ -33,8 +33,7 @@ enum class FrameKind : std::uint32_t {
   stop = 13,    ///< harness, instead of `values`: the cell ends; the tracker answers `stopped` and forgets the samples
   stopped = 14,  ///< tracker
   failed = 15,   ///< tracker, instead of any answer: a line of text
-  bye = 16,      ///< harness: the process ends
-  ping = 17      ///< harness: any bytes; answered by `values` with the same bytes, so that the cost of an exchange is known
+  ping = 16      ///< harness: any bytes; answered by `values` with the same bytes, so that the cost of an exchange is known
 };
 
 struct FrameHeader {

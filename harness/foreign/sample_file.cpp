@@ -9,11 +9,11 @@
 #include <mutex>
 
 #include "harness/foreign/content_hash.h"
+#include "harness/foreign/foreign_entry.h"
 #include "harness/foreign/printable.h"
 #include "harness/io/json_input.h"
 #include "harness/io/npy.h"
 #include "harness/model/names.h"
-#include "harness/registry/estimator_entry.h"
 
 namespace nullmark {
 namespace {
@@ -139,6 +139,7 @@ namespace {
 /// An estimator whose samples somebody else has drawn.  No code runs, so no consent is asked for.
 class SamplesSource final : public EstimatorSource {
  public:
+  static constexpr const char* kName = kSamplesType;
   static constexpr const char* kSummary = "samples from an .npy file, by harness/foreign/foreign.md";
 
   void parameters(ParameterVisitor& visit) override {
@@ -188,16 +189,8 @@ class SamplesSource final : public EstimatorSource {
   mutable std::uint64_t hash_ = 0;
 };
 
-[[maybe_unused]] const bool kSamplesRegistered = [] {
-  EstimatorEntry entry;
-  entry.name = kSamplesType;
-  entry.summary = SamplesSource::kSummary;
-  entry.source = "";
-  entry.quantities = {Quantity::transmittance, Quantity::optical_depth};
-  entry.make = []() -> std::unique_ptr<EstimatorSource> { return std::make_unique<SamplesSource>(); };
-  entry.foreign = true;
-  return Registry<EstimatorEntry>::instance().add(entry);
-}();
+[[maybe_unused]] const bool kSamplesRegistered =
+    Registry<EstimatorEntry>::instance().add(foreign_entry<SamplesSource>({Quantity::transmittance, Quantity::optical_depth}));
 
 }  // namespace
 }  // namespace nullmark

@@ -208,8 +208,6 @@ class LibraryServer {
         draw();
       } else if (kind == FrameKind::ping) {
         stream_.send(FrameKind::values, stream_.payload());
-      } else if (kind == FrameKind::bye) {
-        throw Ended{};
       } else {
         refuse_frame(fmt::format("found frame {}", static_cast<std::uint32_t>(kind)));
       }

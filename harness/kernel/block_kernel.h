@@ -118,7 +118,7 @@ class BlockKernel : public Kernel {
       store(estimator_.expected(depth, static_cast<const State&>(workspace).ray), result.data());
       return result;
     }
-    return quantity == Quantity::transmittance ? Spectrum((-optical_depth).exp()) : optical_depth;
+    return Kernel::expected(workspace, optical_depth, quantity);
   }
 
   std::vector<Theory> theory(const Workspace& workspace, const RayProfile& profile, Quantity quantity) const override {

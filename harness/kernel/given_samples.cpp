@@ -45,19 +45,17 @@ void GivenSamples::copy_row(std::uint64_t sample, Real* out) const {
 
 namespace {
 
-class GivenSamplesKernel final : public Kernel, public LimitedPilot {
+class GivenSamplesKernel final : public Kernel {
  public:
   explicit GivenSamplesKernel(std::shared_ptr<const GivenSamples> samples)
       : samples_(std::move(samples)), split_(split_samples(samples_->samples())) {}
 
-  std::uint64_t pilot_samples() const override { return split_.pilot; }
+  std::optional<std::uint64_t> pilot_samples() const override { return split_.pilot; }
 
   bool needs_optical_depth() const override { return false; }
   bool needs_knots() const override { return false; }
   bool states_theory() const override { return false; }
   bool flies() const override { return false; }
-  bool states_count_law() const override { return false; }
-  std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const override { return {}; }
   std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const override { return {}; }
   bool answers(Quantity quantity) const override {
     return quantity == Quantity::transmittance || quantity == Quantity::optical_depth;
@@ -82,10 +80,6 @@ class GivenSamplesKernel final : public Kernel, public LimitedPilot {
     out.lookups.assign(count, 0);
     counters.samples += count;
     samples_->copy(context.index, of_pilot ? from : split_.pilot + from, count, out.values.data());
-  }
-
-  Spectrum expected(const Workspace&, const Spectrum& optical_depth, Quantity quantity) const override {
-    return quantity == Quantity::transmittance ? Spectrum((-optical_depth).exp()) : optical_depth;
   }
 
  private:

@@ -45,15 +45,8 @@ class GivenSamples {
   std::vector<Real> values_;
 };
 
-/// A kernel that can draw only so many samples a ray for its pilot.
-class LimitedPilot {
- public:
-  virtual ~LimitedPilot() = default;
-  virtual std::uint64_t pilot_samples() const = 0;
-};
-
 /// A kernel that hands out given samples, each for one use: from first_sample::kPilot on the pilot's, from 0 on those judged.  It
-/// throws std::runtime_error where others are asked for.  It is a LimitedPilot.
+/// throws std::runtime_error where others are asked for.
 std::unique_ptr<const Kernel> make_given_samples_kernel(std::shared_ptr<const GivenSamples> samples);
 
 }  // namespace nullmark

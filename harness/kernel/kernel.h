@@ -133,7 +133,12 @@ class Kernel {
                       Quantity, SampleBlock& out, Counters&) const = 0;
 
   /// Mean of the estimator's target on this ray, given the exact optical depth: T = exp(-tau) or tau, unless it defines another.
-  virtual Spectrum expected(const Workspace&, const Spectrum& optical_depth, Quantity) const = 0;
+  virtual Spectrum expected(const Workspace&, const Spectrum& optical_depth, Quantity quantity) const {
+    return quantity == Quantity::transmittance ? Spectrum((-optical_depth).exp()) : optical_depth;
+  }
+
+  /// Samples of a ray that a pilot may draw, where there are only so many.
+  virtual std::optional<std::uint64_t> pilot_samples() const { return std::nullopt; }
 
   /// Exact moments per channel; empty if the estimator states none.  For a free path the variance is that of its weight.  For a
   /// profile only lookups are stated.
@@ -149,8 +154,8 @@ class Kernel {
   virtual bool flies() const = 0;
 
   /// Per channel, for estimators that are products (CountLaw).
-  virtual bool states_count_law() const = 0;
-  virtual std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const = 0;
+  virtual bool states_count_law() const { return false; }
+  virtual std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const { return {}; }
 };
 
 template <class Value>

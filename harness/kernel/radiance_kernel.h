@@ -72,8 +72,6 @@ class RadianceKernel : public Kernel {
   bool answers(Quantity quantity) const override { return quantity == Quantity::radiance; }
   std::size_t outputs(Quantity, const PreparedRay&) const override { return static_cast<std::size_t>(channels_); }
   bool flies() const override { return false; }
-  bool states_count_law() const override { return false; }
-  std::vector<CountLaw> count_law(const Workspace&, const RayProfile&) const override { return {}; }
   std::vector<Theory> theory(const Workspace&, const RayProfile&, Quantity) const override {
     return std::vector<Theory>(static_cast<std::size_t>(channels_));
   }

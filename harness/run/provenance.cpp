@@ -142,6 +142,17 @@ std::map<std::string, std::string> make_provenance(const RunContext& context, st
   return provenance;
 }
 
+RunRecord make_run_record(const Plan& plan, std::vector<CellRecord> cells, const RunContext& context) {
+  RunRecord run;
+  run.name = plan.name;
+  run.config_text = plan.config_text;
+  run.provenance = make_provenance(context, std::chrono::system_clock::now());
+  run.cells = std::move(cells);
+  run.tables = plan.tables;
+  run.claims = plan.claims;
+  return run;
+}
+
 std::string version_line() {
   const SourceState source = source_state();
   return fmt::format("nullmark {} (commit {}{}; {})", NULLMARK_VERSION, source.commit, source.dirty ? ", dirty" : "",

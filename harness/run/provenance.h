@@ -7,6 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/model/plan.h"
+#include "harness/model/record.h"
+
 namespace nullmark {
 
 /// Provenance of a run: source, plug-in, compiler, machine, libraries, command; values are JSON texts.  No host name.
@@ -23,6 +26,9 @@ struct RunContext {
   std::chrono::system_clock::time_point start = std::chrono::system_clock::now();
 };
 std::map<std::string, std::string> make_provenance(const RunContext& context, std::chrono::system_clock::time_point end);
+
+/// A run that ends now: cells of a plan, with its configuration, tables and claims.
+RunRecord make_run_record(const Plan& plan, std::vector<CellRecord> cells, const RunContext& context);
 
 /// "nullmark 0.1.0 (commit 0123abcd, dirty; Release)"
 std::string version_line();

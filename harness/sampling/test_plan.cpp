@@ -166,8 +166,7 @@ class TestPlanner {
       advice_ = "state the variance of the samples (theory)";
     else if (!bounding)
       advice_ =
-          "a range (kRange) holds only under a majorant that is known to bound the extinction: give one, or state the variance "
-          "of "
+          "a range (kRange) holds only under a majorant that is known to bound the extinction: give one, or state the variance of "
           "the samples (theory)";
     else if (range == SampleRange::non_negative)
       advice_ = "state a range that is bounded above (kRange), the variance of the samples (theory)";

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/sampling/pilot_size.h"
 #include "harness/verdict/counted_lookups.h"
 #include "harness/verdict/free_path_law.h"
 #include "harness/verdict/replay_law.h"
@@ -22,7 +21,7 @@ Real lookups_of_a_sample(const Sampled& sampled) {
 
 /// Variances from samples of their own, where theory has none; some of them are kept.
 std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSamples>& kept, const std::function<bool()>& stop) {
-  const std::uint64_t per_ray = pilot_size(prepared);
+  const std::uint64_t per_ray = prepared.kernel->pilot_samples().value_or(prepared.samples_per_ray);
   if (per_ray < 2) return std::nullopt;
   const auto sampled =
       sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,

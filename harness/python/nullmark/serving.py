@@ -9,7 +9,7 @@ import traceback
 
 import numpy as np
 
-from .frames import BYE, FAILED, PING, RAY, RESULT, SAMPLE, STOPPED, THEORY, VALUES, Harness, Stream, read_ray
+from .frames import FAILED, PING, RAY, RESULT, SAMPLE, STOPPED, THEORY, VALUES, Harness, Stream, read_ray
 from .tracker import QUANTITIES, Samples, Stopped, Tracker
 
 _SAMPLE = struct.Struct("<2Qq2i")
@@ -103,8 +103,6 @@ class Server:
                 self._stream.send(VALUES, b"" if told is None else np.array(told, np.float64))
             elif kind == PING:
                 self._stream.send(VALUES, bytes(payload))
-            elif kind == BYE:
-                return
             else:
                 raise ValueError(f"found frame {kind}; expected a ray, a request for samples or for theory")
 

@@ -8,7 +8,7 @@ import sys
 import time
 
 HEADER, GREETING = struct.Struct("<4I"), struct.Struct("<8s4I")
-WELCOME, RAY, SAMPLE, LOOKUP, VALUES, RESULT, PING = 2, 3, 5, 6, 11, 12, 17
+WELCOME, RAY, SAMPLE, LOOKUP, VALUES, RESULT, PING = 2, 3, 5, 6, 11, 12, 16
 fault = sys.argv[1] if len(sys.argv) > 1 else ""
 sent = 0
 
