@@ -24,14 +24,15 @@ std::optional<Real> excluded(const CellRecord& record) {
 }
 
 struct Part {
-  std::size_t cells = 0, pass = 0, fail = 0, open = 0, violated = 0, other = 0;
+  std::size_t cells = 0, pass = 0, fail = 0, errors = 0, open = 0, violated = 0, other = 0;
   Real least = kInfinity, most = 0;  ///< biases that PASSes exclude
 
   void add(const CellRecord& record) {
     ++cells;
     const Kind kind = kind_of(record);
     pass += kind == Kind::pass;
-    fail += kind == Kind::fail || kind == Kind::error;
+    fail += kind == Kind::fail;
+    errors += kind == Kind::error;
     open += kind == Kind::expected_open || kind == Kind::unexpected_open;
     violated += kind == Kind::violated;
     other += kind == Kind::unclaimed || kind == Kind::not_run;
@@ -57,10 +58,11 @@ std::string scenes_text(const RunRecord& run) {
     parts.back().second.add(record);
   }
   std::vector<std::vector<std::string>> lines = {
-      {"scenes", "cells", "PASS", "FAIL", "undecided", "VIOLATED", "not tested", "|bias| excluded"}};
+      {"scenes", "cells", "PASS", "FAIL", "ERROR", "undecided", "VIOLATED", "not tested", "|bias| excluded"}};
   for (const auto& [name, part] : parts)
     lines.push_back({name, fmt::to_string(part.cells), fmt::to_string(part.pass), fmt::to_string(part.fail),
-                     fmt::to_string(part.open), fmt::to_string(part.violated), fmt::to_string(part.other), part.bias_text()});
+                     fmt::to_string(part.errors), fmt::to_string(part.open), fmt::to_string(part.violated),
+                     fmt::to_string(part.other), part.bias_text()});
   return aligned(lines, 1);
 }
 

@@ -166,12 +166,13 @@ class TestPlanner {
       advice_ = "state the variance of the samples (theory)";
     else if (!bounding)
       advice_ =
-          "a range (kRange) holds only under a majorant that is known to bound the extinction: give one, or state the variance of "
+          "a range of the samples holds only under a majorant that is known to bound the extinction: give one, or state the "
+          "variance of "
           "the samples (theory)";
     else if (range == SampleRange::non_negative)
-      advice_ = "state a range that is bounded above (kRange), the variance of the samples (theory)";
+      advice_ = "state a range that is bounded above (kRange; in other languages: range), the variance of the samples (theory)";
     else
-      advice_ = "state a range of the samples (kRange), their variance (theory)";
+      advice_ = "state a range of the samples (kRange; in other languages: range), their variance (theory)";
     advice_ += ", or the guarantee \"exact\"";
   }
 

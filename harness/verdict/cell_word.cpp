@@ -35,6 +35,14 @@ std::string joined(const std::string& first, const std::string& second, const ch
   return first.empty() || second.empty() ? first + second : first + between + second;
 }
 
+/// What a broken law says of the tracker.
+std::string law_text(const LawRecord& law) {
+  std::string text = fmt::format("law \"{}\" is broken (log E = {:.1f})", law.name, law.log_e);
+  if (law.name == "replay")
+    text += ": samples differ when they are drawn again; a sample may depend on its ray and its stream alone";
+  return text;
+}
+
 /// Lookups and laws that fail.
 std::string failures_beside_the_mean(const VerdictRecord& verdict) {
   std::string text;
@@ -43,8 +51,7 @@ std::string failures_beside_the_mean(const VerdictRecord& verdict) {
       if (test.channel < 0)
         text = joined(text, fmt::format("lookups differ from their expectation (log E = {:.1f})", test.log_e_fail), "; ");
   for (const LawRecord& law : verdict.laws)
-    if (law.outcome == Outcome::fail)
-      text = joined(text, fmt::format("law \"{}\" is broken (log E = {:.1f})", law.name, law.log_e), "; ");
+    if (law.outcome == Outcome::fail) text = joined(text, law_text(law), "; ");
   return text;
 }
 
