@@ -264,18 +264,19 @@ void add_theory(std::vector<PreparedCell>& cells, const std::function<bool()>& s
   }
   tbb::parallel_for_each(by_scene.begin(), by_scene.end(), [&](auto& entry) {
     if (stop()) return;
-    auto& [scene, members] = entry;
+    const Scene& scene = *entry.first;
+    const std::vector<PreparedCell*>& members = entry.second;
     std::vector<TheoryQuery> queries;
     for (const PreparedCell* member : members)
       queries.push_back({member->kernel.get(), member->cell->quantity, member->range, &member->targets, &member->cell->name});
     const std::string failure = tracker_failure([&] {
-      const std::vector<CellTheory> theory = compute_theory(*scene, queries);
+      const std::vector<CellTheory> theory = compute_theory(scene, queries);
       for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
     });
     // One of them threw: each by itself shows which.
     for (std::size_t i = 0; i < members.size() && !failure.empty(); ++i)
       members[i]->reason = members[i]->failure =
-          tracker_failure([&] { members[i]->theory = compute_theory(*scene, {queries[i]})[0]; });
+          tracker_failure([&] { members[i]->theory = compute_theory(scene, {queries[i]})[0]; });
   });
   if (stop()) return;
   for (PreparedCell& prepared : cells) {
