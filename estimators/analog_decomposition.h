@@ -45,9 +45,9 @@ struct AnalogDecompositionTracking {
   };
 
   void prepare(RayData& ray) const {
-    ray.control.start(ray.begin, ray.bounds.crossing);
-    ray.residual.start(ray.begin, ray.bounds.crossing);
-    for (const Segment& segment : ray.bounds.segments) {
+    ray.control.start(ray.begin, ray.bounds.crossing());
+    ray.residual.start(ray.begin, ray.bounds.crossing());
+    for (const Segment& segment : ray.bounds.segments()) {
       const Real mu_c = control == "given" ? value : factor * segment.extinction.minimum[0];
       ray.control.append(segment.end, mu_c);
       ray.residual.append(segment.end, std::max<Real>(0, segment.majorant - mu_c));

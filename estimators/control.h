@@ -129,7 +129,7 @@ void prepare_control(const ControlChoice& choice, const MediumRay<Value>& ray, C
   control.first = choice.value;
   control.depth = ray.value(0);
   control.growth_depth = 0;
-  residual.start(ray.begin, ray.bounds.crossing);
+  residual.start(ray.begin, ray.bounds.crossing());
   if (!(ray.length() > 0)) return;
   if (control.linear) {
     control.growth = choice.value_end - choice.value;
@@ -139,7 +139,7 @@ void prepare_control(const ControlChoice& choice, const MediumRay<Value>& ray, C
     const Real mean = control.growth == 0 ? 1 : std::expm1(control.growth) / control.growth;
     control.depth = ray.value(choice.value * mean * ray.length());
   }
-  for (const Segment& segment : ray.bounds.segments) {
+  for (const Segment& segment : ray.bounds.segments()) {
     const Value low = value(segment.extinction.minimum), high = value(segment.extinction.maximum),
                 average = value(segment.extinction.average);
     Value least = low, most = low;  // of the control inside the segment

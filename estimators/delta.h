@@ -42,8 +42,8 @@ struct DeltaTracking {
     ray.per_channel.resize(static_cast<std::size_t>(ray.channels));
     for (int c = 0; c < ray.channels; ++c) {
       Rates& rates = ray.per_channel[static_cast<std::size_t>(c)];
-      rates.start(ray.begin, ray.bounds.crossing);
-      for (const Segment& segment : ray.bounds.segments) {
+      rates.start(ray.begin, ray.bounds.crossing());
+      for (const Segment& segment : ray.bounds.segments()) {
         const Real most = segment.extinction.maximum.maxCoeff();
         rates.append(segment.end, most > 0 ? segment.majorant * (segment.extinction.maximum[c] / most) : segment.majorant);
       }

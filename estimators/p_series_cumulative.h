@@ -71,7 +71,7 @@ struct PowerSeriesCumulative {
     constexpr Real kRounding = 1e-12;
     Ratios ratios;
     std::optional<Spectrum> found;
-    for (const Segment& segment : ray.bounds.segments) {
+    for (const Segment& segment : ray.bounds.segments()) {
       if (!(segment.majorant > 0)) continue;
       const Spectrum high = (segment.majorant - segment.extinction.minimum) / segment.majorant;
       const Spectrum low = (segment.majorant - segment.extinction.maximum) / segment.majorant;

@@ -39,9 +39,9 @@ struct ResidualDeltaTracking {
   /// The rate is what the majorant leaves above the smallest control of all channels, so that a loose majorant stays loose.
   void prepare(RayData& ray) const {
     prepare_control<Value>(choice, ray, ray.control, ray.residual);
-    ray.residual.start(ray.begin, ray.bounds.crossing);
-    for (std::size_t i = 0; i < ray.bounds.segments.size(); ++i) {
-      const Segment& segment = ray.bounds.segments[i];
+    ray.residual.start(ray.begin, ray.bounds.crossing());
+    for (std::size_t i = 0; i < ray.bounds.segments().size(); ++i) {
+      const Segment& segment = ray.bounds.segments()[i];
       ray.residual.append(segment.end, std::max<Real>(0, segment.majorant - smallest(ray.control.of_segment[i])));
     }
   }

@@ -57,7 +57,7 @@ struct SpectralTracking {
     ray.control.clear();
     ray.excess.clear();
     if (control == "none") return;
-    for (const Segment& segment : ray.bounds.segments) {
+    for (const Segment& segment : ray.bounds.segments()) {
       ray.control.push_back(load<Value>(segment.extinction.minimum.data(), ray.channels));
       ray.excess.push_back(load<Value>(segment.extinction.maximum.data(), ray.channels) - ray.control.back());
     }

@@ -53,7 +53,7 @@ struct UnbiasedRayMarching {
     ray.steps = ray.step = 0;
     if (!(thickness > 0)) return;
     if (control == "majorant_minorant")
-      for (const Segment& segment : ray.bounds.segments)
+      for (const Segment& segment : ray.bounds.segments())
         thickness -= segment.extinction.minimum.minCoeff() * (segment.end - segment.begin);
     thickness = std::max<Real>(0, thickness);
     const Real lookups = std::ceil(std::cbrt((.015 + thickness) * (.65 + thickness) * (60.3 + thickness)));

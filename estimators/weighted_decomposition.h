@@ -57,10 +57,10 @@ struct WeightedDecompositionTracking {
     choice.kind = control;
     choice.value = std::accumulate(controls.begin(), controls.end(), Real{0});
     prepare_control<Value>(choice, ray, ray.constant, ray.deviation);
-    ray.control.start(ray.begin, ray.bounds.crossing);
-    ray.rate.start(ray.begin, ray.bounds.crossing);
+    ray.control.start(ray.begin, ray.bounds.crossing());
+    ray.rate.start(ray.begin, ray.bounds.crossing());
     for (std::size_t i = 0; i < ray.constant.of_segment.size(); ++i) {
-      const Segment& segment = ray.bounds.segments[i];
+      const Segment& segment = ray.bounds.segments()[i];
       const Real mu_c = channel(ray.constant.of_segment[i], 0);
       ray.control.append(segment.end, mu_c);
       ray.rate.append(segment.end, segment.majorant > mu_c ? segment.majorant : mu_c + ray.deviation.rate(i));

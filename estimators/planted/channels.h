@@ -19,7 +19,7 @@ struct PlantedChannelMajorant : RatioTracking<Value> {
 
   void prepare(RayData& ray) const {
     ray.first.start(ray.begin);
-    for (const Segment& segment : ray.bounds.segments) {
+    for (const Segment& segment : ray.bounds.segments()) {
       const Real most = segment.extinction.maximum.maxCoeff();
       ray.first.append(segment.end, most > 0 ? segment.majorant * (segment.extinction.maximum[0] / most) : segment.majorant);
     }

@@ -33,8 +33,8 @@ struct PlantedLearnedBound {
   void prepare(RayData& ray) const {
     for (int i = 0; i < kGuesses; ++i) {
       Rates& rates = ray.guesses[static_cast<std::size_t>(i)];
-      rates.start(ray.begin, ray.bounds.crossing);
-      for (const Segment& segment : ray.bounds.segments)
+      rates.start(ray.begin, ray.bounds.crossing());
+      for (const Segment& segment : ray.bounds.segments())
         rates.append(segment.end, std::ldexp(segment.majorant, i + 1 - kGuesses));
     }
   }

@@ -18,8 +18,8 @@ struct PlantedUnitLength : RatioTracking<Value> {
   };
 
   void prepare(RayData& ray) const {
-    ray.flown.start(ray.begin, ray.bounds.crossing);
-    for (const Segment& segment : ray.bounds.segments) ray.flown.append(segment.end, segment.majorant / ray.length());
+    ray.flown.start(ray.begin, ray.bounds.crossing());
+    for (const Segment& segment : ray.bounds.segments()) ray.flown.append(segment.end, segment.majorant / ray.length());
   }
 
   using Walk = typename RatioTracking<Value>::Walk;

@@ -6,7 +6,7 @@
 
 #include "estimators/walk/flight.h"
 #include "media/base/value.h"
-#include "media/majorants/majorant.h"
+#include "media/majorants/ray_bounds.h"
 
 namespace nullmark {
 
@@ -16,7 +16,7 @@ struct MediumRay {
   Real begin = 0, end = 0;  ///< world lengths
   int channels = 1;
   Rates majorant;                    ///< one piece per segment, the majorant of the largest channel
-  SegmentBuffer bounds;              ///< extrema per segment
+  RayBounds bounds;                  ///< extrema per segment
   Extrema medium;                    ///< over the whole medium
   std::optional<Value> exact_depth;  ///< tau in closed form or by exact traversal; only for estimators with kNeedsOpticalDepth
   std::vector<Real> knots;           ///< sorted, begin and end included; only for estimators with kNeedsKnots

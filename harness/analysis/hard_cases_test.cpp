@@ -82,7 +82,7 @@ TEST(HardCases, WalksThatDoNotEndAreCounted) {
   const auto medium = constant(1000);
   PreparedRay context;
   context.local = context.world = Ray{{0, 0.5, 0.5}, Vec3::UnitX(), 0, 1};
-  context.segments.segments = {{0, 1, 1000, medium->extrema(medium->bounds())}};
+  context.bounds.start({{0, 1, 1000, medium->extrema(medium->bounds())}});
   for (const auto precision : {Precision::float64, Precision::float32}) {
     const auto kernel = source.kernel(1, precision);
     const BlockKernel<RatioTracking, Real> plain(RatioTracking<Real>(), 1);

@@ -88,9 +88,9 @@ void SampleHost::begin_ray(const Medium& medium, const PreparedRay& context) {
   channels_ = static_cast<std::size_t>(medium.channels());
   world_to_local_ = medium.world_to_local();
   const Ray& world = context.world;
-  rates_.start(world.begin, context.segments.crossing);
+  rates_.start(world.begin, context.bounds.crossing());
   for (std::vector<double>* list : {&ends_, &rate_, &minimum_, &average_, &maximum_, &albedo_}) list->clear();
-  for (const Segment& segment : context.segments.segments) {
+  for (const Segment& segment : context.bounds.segments()) {
     rates_.append(segment.end, segment.majorant);
     ends_.push_back(segment.end);
     rate_.push_back(segment.majorant);
@@ -107,7 +107,7 @@ void SampleHost::begin_ray(const Medium& medium, const PreparedRay& context) {
   ray_.size = sizeof ray_;
   ray_.channels = static_cast<std::int32_t>(channels_);
   ray_.segments = static_cast<std::int32_t>(ends_.size());
-  ray_.crossing = context.segments.crossing == Crossing::rewind;
+  ray_.crossing = context.bounds.crossing() == Crossing::rewind;
   ray_.id = context.index;
   for (int axis = 0; axis < 3; ++axis) {
     ray_.origin[axis] = world.origin[axis];

@@ -90,7 +90,7 @@ class AbsorptionKernel final : public RadianceKernel {
     mine.local = sight.local;
     mine.index = context.index;
     mine.albedo = context.albedo;
-    scene_.majorant->segments(mine.world, mine.local, mine.segments);
+    mine.bounds.start(*scene_.majorant, mine.world, mine.local);
     mine.knots.clear();
     mine.exact_depth.reset();
     if (transmittance_->needs_knots()) sorted_knots(medium, mine.local, mine.knots);

@@ -70,8 +70,7 @@ class BlockKernel : public Kernel {
     State& state = static_cast<State&>(workspace);
     RayData& ray = state.ray;
     state.local = context.local;
-    ray.bounds.segments.assign(context.segments.segments.begin(), context.segments.segments.end());
-    ray.bounds.crossing = context.segments.crossing;
+    ray.bounds = context.bounds;
     ray.exact_depth.reset();
     if (context.exact_depth) ray.exact_depth = load<Value>(context.exact_depth->data(), channels_);
     ray.knots.assign(context.knots.begin(), context.knots.end());

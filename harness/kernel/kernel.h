@@ -15,7 +15,7 @@ namespace nullmark {
 struct PreparedRay {
   Ray world, local;  ///< cut to the medium
   std::uint32_t index = 0;
-  SegmentBuffer segments;
+  RayBounds bounds;
   std::vector<Real> knots;              ///< sorted, with begin and end; filled only when the kernel needs them
   std::optional<Spectrum> exact_depth;  ///< filled only when the kernel needs it
   Spectrum albedo;                      ///< mu_s / mu per channel; empty: 0

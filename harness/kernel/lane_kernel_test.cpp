@@ -108,7 +108,7 @@ Sampled sampled(const Kernel& kernel, const Case& with, std::size_t count, Quant
   context.world = with.world;
   context.world.begin = context.local.begin;
   context.world.end = context.local.end;
-  with.majorant->segments(context.world, context.local, context.segments);
+  context.bounds.start(*with.majorant, context.world, context.local);
   if (kernel.needs_optical_depth()) context.exact_depth = Spectrum::Constant(1, 1.25);
   kernel.begin_ray(*workspace, *with.medium, extrema, context);
   Sampled out;

@@ -155,7 +155,7 @@ TEST(PathAbsorption, IsTheTransmittanceKernelTimesWhatLiesBehind) {
     // Lengths from the entry, as the path's flights have them.
     for (Ray* each : {&context.world, &context.local})
       *each = {each->at(each->begin), each->direction, 0, each->end - each->begin};
-    scene.majorant->segments(context.world, context.local, context.segments);
+    context.bounds.start(*scene.majorant, context.world, context.local);
     if (kernel->needs_knots()) sorted_knots(*scene.medium, context.local, context.knots);
     kernel->begin_ray(*workspace, *scene.medium, scene.medium->extrema(scene.medium->bounds()), context);
     kernel->sample(*workspace, *scene.medium, context, 1, 0, 3000, Quantity::transmittance, block, counters);

@@ -78,7 +78,7 @@ inline PreparedRay context_of(const TransportScene& scene, const Ray& ray, std::
   context.world.begin = context.local.begin;
   context.world.end = context.local.end;
   context.index = index;
-  scene.majorant->segments(context.world, context.local, context.segments);
+  context.bounds.start(*scene.majorant, context.world, context.local);
   return context;
 }
 

@@ -17,14 +17,13 @@ void prepare_ray(RayData& ray, const Medium& medium, const Extrema& extrema, con
   ray.channels = channels;
   ray.medium = extrema;
   ray.degree = medium.polynomial_degree();
-  ray.majorant.start(ray.begin, ray.bounds.crossing);
-  for (const Segment& segment : ray.bounds.segments) ray.majorant.append(segment.end, segment.majorant);
+  ray.bounds.start_rates(ray.begin, ray.majorant);
   if constexpr (Traits::kNeedsInversion)
     // Two pointers fit std::function's own memory; a ray would be allocated for every leg of a path.
     ray.distance_at_depth = [&medium, along = &local](Real depth) { return distance_at_depth(medium, *along, depth); };
   if constexpr (Traits::kNeedsShares) {
     ray.shares.clear();
-    for (const Segment& segment : ray.bounds.segments) {
+    for (const Segment& segment : ray.bounds.segments()) {
       const Vec3 a = local.at(segment.begin), b = local.at(segment.end);
       Spectrum bounds = medium.component_maxima({a.cwiseMin(b), a.cwiseMax(b)});
       if (!(bounds.sum() > 0)) bounds.setOnes();

@@ -121,7 +121,7 @@ class EstimatorWalker final : public Walker<Value> {
     State& state = static_cast<State&>(memory);
     Along& ray = state.ray;
     state.local = local;
-    path_scene.majorant->segments(world, local, ray.bounds);
+    ray.bounds.start(*path_scene.majorant, world, local);
     ray.exact_depth.reset();
     if (needs_optical_depth())
       ray.exact_depth = load<Value>(optical_depth(*path_scene.medium, local).depth.data(), path_scene.channels);
@@ -151,14 +151,17 @@ class EstimatorWalker final : public Walker<Value> {
   }
 
  private:
-  /// Walks to the end and returns its distance.
-  Flight walk(State& state, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget, Counters& counters) const {
+  /// Walks to the end and returns its distance.  All of a step is inlined.
+  [[gnu::flatten]] Flight walk(State& state, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget,
+                               Counters& counters) const {
     Flight flight;
     flight.start(state.ray.majorant);
     estimator_.init(state.walk, state.ray, flight, rng);
     std::uint64_t lookups = 0;
+    const Vec3 origin = state.local.origin, direction = state.local.direction;
     while (!budget.exhausted() && estimator_.propose(state.walk, state.ray, flight, rng)) {
-      const Vec3 p = state.local.at(flight.position());
+      const Real t = flight.position();
+      const Vec3 p(origin.x() + t * direction.x(), origin.y() + t * direction.y(), origin.z() + t * direction.z());
       if constexpr (Traits::kNeedsShares) {
         const int component = estimator_.component(state.walk);
         state.extinction[0] = path_scene.medium->component_extinction(component, p) / state.ray.shares[flight.piece()][component];

@@ -35,8 +35,8 @@ struct Replay {
     context.world = built.world.at(0);
     context.local = built.local.at(0);
     const auto bounds = make_majorant(structure)->build(medium.medium);
-    bounds->segments(context.world, context.local, context.segments);
-    segments = context.segments.segments;
+    context.bounds.start(*bounds, context.world, context.local);
+    segments = context.bounds.segments();
     const auto workspace = kernel->workspace();
     kernel->begin_ray(*workspace, *medium.medium, medium.extrema, context);
     Counters counters;
@@ -152,7 +152,7 @@ TEST(Replay, TransmittanceMultiplies) {
       context.local = rays.local[0];
       const Real cut = context.world.begin + 0.37 * context.world.length();
       for (Ray* ray : {&context.world, &context.local}) (part == 0 ? ray->end : ray->begin) = cut;
-      structure->segments(context.world, context.local, context.segments);
+      context.bounds.start(*structure, context.world, context.local);
       const auto workspace = kernel->workspace();
       kernel->begin_ray(*workspace, *built.medium, built.extrema, context);
       SampleBlock block;

@@ -90,6 +90,7 @@ std::vector<Place> places() {
     const auto rays = std::make_shared<const BuiltRays>(build_rays({"chords", {{"count", 3}}, {}, {}}, *medium));
     std::vector<Component> majorants = {{"grid", {{"crossing", "rewind"}}, {}, {}}};
     for (const ComponentInfo& entry : registered(ComponentKind::majorant)) {
+      if (entry.name == "vdb_nodes" && !medium->medium->has_nodes()) continue;
       majorants.push_back({entry.name, {}, {}, {}});
       if (entry.name == "prescribed") majorants.back().values["value"] = 1.5 * bound;
     }

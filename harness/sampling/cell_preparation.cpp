@@ -149,12 +149,11 @@ Real CellPreparer::deepest_majorant(const Scene& scene) {
   const auto [known, fresh] = deepest_.try_emplace(&scene, 0);
   if (!fresh) return known->second;
   Real& deepest = known->second;
-  SegmentBuffer buffer;
+  RayBounds bounds;
   Rates rates;
   for (std::size_t ray = 0; ray < scene.rays->world.size(); ++ray) {
-    scene.majorant->structure->segments(scene.rays->world[ray], scene.rays->local[ray], buffer);
-    rates.start(scene.rays->world[ray].begin);
-    for (const Segment& segment : buffer.segments) rates.append(segment.end, segment.majorant);
+    bounds.start(*scene.majorant->structure, scene.rays->world[ray], scene.rays->local[ray]);
+    bounds.start_rates(scene.rays->world[ray].begin, rates);
     deepest = std::max(deepest, rates.total_depth());
   }
   return deepest;

@@ -219,7 +219,7 @@ void Scene::context(std::size_t ray, const Kernel& kernel, PreparedRay& out) con
   out.local = rays->local[ray];
   out.index = static_cast<std::uint32_t>(ray);
   out.albedo = medium->albedo;
-  majorant->structure->segments(out.world, out.local, out.segments);
+  out.bounds.start(*majorant->structure, out.world, out.local);
   out.marks = {};
   if (marks) out.marks = {&marks->distance[ray * marks->per_ray], marks->per_ray};
   out.knots.clear();

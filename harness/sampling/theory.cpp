@@ -11,10 +11,10 @@
 
 namespace nullmark {
 
-RayProfile make_profile(const Medium& medium, const Ray& local, const SegmentBuffer& buffer) {
+RayProfile make_profile(const Medium& medium, const Ray& local, const std::vector<Segment>& segments) {
   std::vector<Real> knots, ends, rates;
   sorted_knots(medium, local, knots);
-  for (const Segment& segment : buffer.segments) {
+  for (const Segment& segment : segments) {
     ends.push_back(segment.end);
     rates.push_back(segment.majorant);
   }
@@ -77,8 +77,8 @@ RayTheories::RayTheories(const Scene& scene, const std::vector<TheoryQuery>& que
         if (queries[k].name) named.emplace(*queries[k].name);
         scene.context(ray, kernel, mine.context);
         if (!profile) {
-          profile.emplace(make_profile(medium, scene.rays->local[ray], mine.context.segments));
-          for (const Segment& segment : mine.context.segments.segments)
+          profile.emplace(make_profile(medium, scene.rays->local[ray], mine.context.bounds.segments()));
+          for (const Segment& segment : mine.context.bounds.segments())
             majorant_depth_[ray] += segment.majorant * (segment.end - segment.begin);
         }
         kernel.begin_ray(*mine.workspaces[k], medium, scene.medium->extrema, mine.context);

@@ -34,6 +34,6 @@ struct TheoryQuery {
 std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<TheoryQuery>& queries);
 
 /// The extinction along a ray, cut at the medium's knots and the segments' ends.
-RayProfile make_profile(const Medium& medium, const Ray& local, const SegmentBuffer& segments);
+RayProfile make_profile(const Medium& medium, const Ray& local, const std::vector<Segment>& segments);
 
 }  // namespace nullmark

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "harness/model/in_flight.h"
 #include "harness/model/names.h"
 #include "harness/sampling/reference_loops.h"
 #include "media/volumes/volume.h"

@@ -26,11 +26,13 @@ class HandWalked {
       : estimator(std::move(tracker)), medium_(std::move(medium)) {
     const Vec3 middle = (medium_->bounds().lo + medium_->bounds().hi) / 2;
     line_ = {{0, middle.y(), middle.z()}, Vec3::UnitX(), 0, length};
+    std::vector<Segment> segments;
     for (int i = 0; i < pieces; ++i) {
       const Real a = length * i / pieces, b = i + 1 == pieces ? length : length * (i + 1) / pieces;
       const Extrema bounds = medium_->extrema({line_.at(a), line_.at(b)});
-      ray.bounds.segments.push_back({a, b, bounds.maximum.maxCoeff() * looseness, bounds});
+      segments.push_back({a, b, bounds.maximum.maxCoeff() * looseness, bounds});
     }
+    ray.bounds.start(std::move(segments));
     if (const auto depth = medium_->optical_depth(line_)) ray.exact_depth = load<Value>(depth->data(), medium_->channels());
     sorted_knots(*medium_, line_, ray.knots);
     prepare_ray<EstimatorTraits<E, Value>>(ray, *medium_, medium_->extrema(medium_->bounds()), line_, line_, medium_->channels());
@@ -81,7 +83,7 @@ class HandWalked {
 
   RayProfile profile() const {
     std::vector<Real> ends, rates;
-    for (const Segment& segment : ray.bounds.segments) {
+    for (const Segment& segment : ray.bounds.segments()) {
       ends.push_back(segment.end);
       rates.push_back(segment.majorant);
     }

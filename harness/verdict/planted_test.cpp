@@ -151,7 +151,7 @@ TEST(Planted, BatchStreamsRepeatThemselves) {
   const auto extrema = medium.extrema;
   PreparedRay context;
   context.world = context.local = Ray{Vec3(0, 0.5, 0.5), Vec3::UnitX(), 0, 1};
-  context.segments.segments.push_back({0, 1, 5 * extrema.maximum[0], extrema});
+  context.bounds.start({{0, 1, 5 * extrema.maximum[0], extrema}});
   const auto draw = [&](const char* estimator, std::uint64_t first) {
     const auto kernel = make_estimator({estimator, {}, estimator, ""})->kernel(1);
     const auto workspace = kernel->workspace();

@@ -116,12 +116,12 @@ class LawTester {
     // With many collisions no count comes often enough.
     constexpr Real kMostCollisions = 500;
     if (cell_.quantity == Quantity::transmittance && kernel_.states_count_law() && theory_.lookups.value_or(0) < kMostCollisions)
-      laws_ = kernel_.count_law(workspace, make_profile(*scene_.medium->medium, scene_.rays->local[ray], context_.segments));
+      laws_ = kernel_.count_law(workspace, make_profile(*scene_.medium->medium, scene_.rays->local[ray], context_.bounds.segments()));
     by_count_.emplace_back();
 
     Real depth = 0;
     depths_.clear();
-    for (const Segment& segment : context_.segments.segments) {
+    for (const Segment& segment : context_.bounds.segments()) {
       depths_.push_back(depth);
       if (segment.majorant > 0) depth += segment.majorant * (segment.end - segment.begin);
     }
@@ -148,7 +148,7 @@ class LawTester {
   }
 
   Real depth_at(Real position) const {
-    const auto& segments = context_.segments.segments;
+    const auto& segments = context_.bounds.segments();
     const auto after = std::upper_bound(segments.begin(), segments.end(), position,
                                         [](Real t, const Segment& segment) { return t < segment.end; });
     if (after == segments.end()) return majorant_depth_;

@@ -39,8 +39,12 @@ class Spectral final : public Medium {
 
   Extrema extrema(const Box& box) const override {
     const Extrema grey = grey_->extrema(box);
-    return {scaled(grey.minimum[0]), scaled(grey.average[0]), scaled(grey.maximum[0])};
+    return {nullmark::scaled(spectrum_, grey.minimum[0]), nullmark::scaled(spectrum_, grey.average[0]),
+            nullmark::scaled(spectrum_, grey.maximum[0])};
   }
+
+  std::optional<ScaledField> scaled() const override { return ScaledField{grey_.get(), spectrum_}; }
+  bool has_nodes() const override { return grey_->has_nodes(); }
 
   void knots(const Ray& ray, std::vector<Real>& t) const override { grey_->knots(ray, t); }
   std::optional<int> polynomial_degree() const override { return grey_->polynomial_degree(); }
@@ -49,7 +53,7 @@ class Spectral final : public Medium {
   std::optional<Spectrum> optical_depth(const Ray& ray) const override {
     const std::optional<Spectrum> grey = grey_->optical_depth(ray);
     if (!grey) return std::nullopt;
-    return scaled((*grey)[0]);
+    return nullmark::scaled(spectrum_, (*grey)[0]);
   }
 
   std::optional<Real> distance_at_depth(const Ray& ray, Real depth) const override {
@@ -58,9 +62,6 @@ class Spectral final : public Medium {
   }
 
  private:
-  // An unbounded maximum times a factor 0 is 0, not NaN.
-  Spectrum scaled(Real grey) const { return (spectrum_ == 0).select(Spectrum::Zero(spectrum_.size()), spectrum_ * grey); }
-
   std::shared_ptr<const Medium> grey_;
   Spectrum spectrum_;
 };
@@ -122,6 +123,10 @@ class PerChannel final : public Medium {
       all.maximum[c] = one.maximum[0];
     }
     return all;
+  }
+
+  bool has_nodes() const override {
+    return std::all_of(components_.begin(), components_.end(), [](const auto& component) { return component->has_nodes(); });
   }
 
   void knots(const Ray& ray, std::vector<Real>& t) const override {

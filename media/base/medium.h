@@ -34,6 +34,11 @@ struct Extrema {
   }
 };
 
+/// An extrema's number of a grey field in all channels.  An unbounded number times a factor 0 is 0, not NaN.
+inline Spectrum scaled(const Spectrum& factors, Real grey) {
+  return (factors == 0).select(Spectrum::Zero(factors.size()), factors * grey);
+}
+
 /// A field of extinction mu >= 0 in 1/length (world), with what bounds it.  Zero outside `bounds()`.  Everything is told in a
 /// local frame (unit cube, box, voxel indices), reached from the world by `world_to_local()`; distances t along rays stay world
 /// lengths. Immutable after construction, so one instance serves all threads.
@@ -57,6 +62,16 @@ class Medium {
 
   /// Bounds and average over a local box (cut to `bounds()`; the vacuum outside is not counted).
   virtual Extrema extrema(const Box& box) const = 0;
+
+  /// Where mu_c(p) = factors[c] grey(p): the grey field and the factors.
+  struct ScaledField {
+    const Medium* grey;
+    Spectrum factors;
+  };
+  virtual std::optional<ScaledField> scaled() const { return std::nullopt; }
+
+  /// Whether the local frame counts voxels that are stored in nodes of 8^3, aligned to multiples of 8.
+  virtual bool has_nodes() const { return false; }
 
   /// Appends distances t in (ray.begin, ray.end), in any order, at which the extinction along the local ray or one of its
   /// derivatives jumps, and enough of them that between neighbours it is resolved by a 15-point rule.

@@ -2,7 +2,9 @@
 
 #include <array>
 
+#include "media/majorants/bounds_table.h"
 #include "media/majorants/crossing.h"
+#include "media/majorants/lattice_walk.h"
 #include "media/majorants/register_majorant.h"
 
 namespace nullmark {
@@ -15,21 +17,30 @@ class GridMajorant final : public MajorantStructure {
   GridMajorant(const Medium& medium, const std::array<int, 3>& resolution, Real looseness, Crossing crossing = Crossing::carry);
 
   void segments(const Ray& world, const Ray& local, SegmentBuffer& out) const override;
-  StructureSize size() const override { return {cells_.size(), 0, sizeof *this + cells_.size() * sizeof(Extrema)}; }
+  std::unique_ptr<Traversal> traversal() const override;
+  Crossing crossing() const override { return crossing_; }
+  StructureSize size() const override { return {cells_.cells(), 0, sizeof *this + cells_.bytes()}; }
+
+  /// Where a walk along a ray stands.
+  struct Walk {
+    Ray local;
+    LatticeWalk steps;
+  };
+  void start(Walk& walk, const Ray& world, const Ray& local) const;
+  template <class Visit>
+  bool walk(Walk& walk, const Visit& visit) const;
+  Real rate(std::size_t cell) const { return looseness_ * cells_.largest(cell); }
 
  private:
-  const Extrema& cell(const std::array<int, 3>& at) const { return cells_[index(at)]; }
-
   std::size_t index(const std::array<int, 3>& at) const {
-    const int cell = (at[2] * resolution_[1] + at[1]) * resolution_[0] + at[0];  // of 512^3 at most
+    const int cell = (at[2] * lattice_.resolution[1] + at[1]) * lattice_.resolution[0] + at[0];  // of 512^3 at most
     return static_cast<std::size_t>(cell);
   }
 
-  std::array<int, 3> resolution_;
   Real looseness_, diagonal_ = 0;
   Crossing crossing_;
-  Box box_;
-  std::vector<Extrema> cells_;
+  Lattice lattice_;
+  BoundsTable cells_;
 };
 
 struct GridMajorantSource final : MajorantSource {

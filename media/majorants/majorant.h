@@ -6,13 +6,9 @@
 #include <vector>
 
 #include "media/base/medium.h"
+#include "media/majorants/rates.h"
 
 namespace nullmark {
-
-/// What a flight does at the end of a cell.  carry: what is left of its exponential goes on in the next cell; rewind: it is cut
-/// there and drawn anew in the next cell that has a rate [Yue et al. 2010, Sec. 3].  The exponential has no memory, so collisions
-/// follow the same law; rewinding costs one more random number per cell left.
-enum class Crossing { carry, rewind };
 
 /// One stretch of a ray with bounds on the extinction inside it.
 struct Segment {
@@ -59,7 +55,57 @@ class MajorantStructure {
   /// medium's bounds).  An empty interval gives no segment.
   virtual void segments(const Ray& world, const Ray& local, SegmentBuffer& out) const = 0;
 
+  /// The same segments, found as flights come to them; the structure outlives it.  Without an override all are listed at once.
+  virtual std::unique_ptr<Traversal> traversal() const;
+
+  virtual Crossing crossing() const { return Crossing::carry; }
+
   virtual StructureSize size() const = 0;
+};
+
+/// Lists a ray's segments and hands them out together.
+class ListedTraversal final : public Traversal {
+ public:
+  explicit ListedTraversal(const MajorantStructure& structure) : structure_(structure) {}
+
+  void start(const Ray& world, const Ray& local) override { structure_.segments(world, local, listed_); }
+
+  bool extend(RatePieces& pieces, Real) override {
+    for (const Segment& segment : listed_.segments) pieces.append(segment.end, segment.majorant);
+    return false;
+  }
+
+ private:
+  const MajorantStructure& structure_;
+  SegmentBuffer listed_;
+};
+
+inline std::unique_ptr<Traversal> MajorantStructure::traversal() const { return std::make_unique<ListedTraversal>(*this); }
+
+/// The cells of a structure along a ray.  Structure has
+///
+///   Walk                                  where a walk along a ray stands
+///   void start(Walk&, world, local) const
+///   bool walk(Walk&, visit) const         visit(end, cell) for the cells that follow, until it returns false (then true) or the
+///                                         ray ends (then false)
+///   Real rate(cell) const
+template <class Structure>
+class CellTraversal final : public Traversal {
+ public:
+  explicit CellTraversal(const Structure& structure) : structure_(structure) {}
+
+  void start(const Ray& world, const Ray& local) override { structure_.start(walk_, world, local); }
+
+  bool extend(RatePieces& pieces, Real depth) override {
+    return structure_.walk(walk_, [&](Real end, std::size_t cell) {
+      pieces.append(end, structure_.rate(cell));
+      return !(depth < pieces.total_depth());
+    });
+  }
+
+ private:
+  const Structure& structure_;
+  typename Structure::Walk walk_;
 };
 
 }  // namespace nullmark

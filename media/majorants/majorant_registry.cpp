@@ -4,6 +4,7 @@
 #include "media/majorants/octree.h"
 #include "media/majorants/prescribed.h"
 #include "media/majorants/ray_maximum.h"
+#include "media/majorants/vdb_nodes.h"
 
 namespace nullmark {
 
@@ -13,5 +14,6 @@ NULLMARK_REGISTER_MAJORANT(KdTreeSource);
 NULLMARK_REGISTER_MAJORANT(OctreeSource);
 NULLMARK_REGISTER_MAJORANT(PrescribedMajorantSource);
 NULLMARK_REGISTER_MAJORANT(RayMaximumSource);
+NULLMARK_REGISTER_MAJORANT(VdbNodesSource);
 
 }  // namespace nullmark

@@ -3,6 +3,7 @@
 #include "harness/sampling/scene.h"
 #include "harness/testing/bench.h"
 #include "harness/testing/example_media.h"
+#include "media/majorants/vdb_nodes.h"
 
 namespace nullmark {
 namespace {
@@ -72,6 +73,7 @@ void add(const std::string& name, const Component& field) {
   benchmark::RegisterBenchmark((group + "0 grid, hand-written").c_str(),
                                [=](benchmark::State& state) { plain_grid(state, *medium, *rays); });
   for (const ComponentInfo& entry : registered(ComponentKind::majorant)) {
+    if (entry.name == VdbNodesSource::kName && !medium->medium->has_nodes()) continue;
     const std::shared_ptr<const MajorantStructure> majorant = build_majorant({entry.name, {}, {}, {}}, *medium).structure;
     benchmark::RegisterBenchmark((group + entry.name).c_str(),
                                  [=](benchmark::State& state) { traverse(state, *majorant, *rays); });

@@ -6,7 +6,7 @@ namespace nullmark {
 
 TreeMajorant::TreeMajorant(const Medium& medium, const BoundLattice& lattice, const Partition& partition, Real looseness,
                            Crossing crossing)
-    : crossing_(crossing) {
+    : looseness_(looseness), crossing_(crossing) {
   std::vector<Block> blocks;
   Real cuts = 0;
   const auto place = [&](const auto& self, const Partition& part, const Block& block, std::size_t at) -> void {
@@ -25,7 +25,8 @@ TreeMajorant::TreeMajorant(const Medium& medium, const BoundLattice& lattice, co
   nodes_.resize(1);
   place(place, partition, lattice.whole(), 0);
 
-  cells_.resize(blocks.size());
+  cells_ = BoundsTable(medium.channels(), blocks.size());
+  diagonals_.resize(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     // Both are bounds: the medium's own over the cell, and those of the lattice, which the partition was chosen by.
     const Extrema parts = lattice.bounds(blocks[i]);
@@ -33,54 +34,72 @@ TreeMajorant::TreeMajorant(const Medium& medium, const BoundLattice& lattice, co
     whole.minimum = whole.minimum.max(parts.minimum);
     whole.maximum = whole.maximum.min(parts.maximum);
     whole.average = whole.average.max(whole.minimum).min(whole.maximum);
-    cells_[i] = {whole, looseness * whole.maximum.maxCoeff(), lattice.diagonal(blocks[i])};
+    cells_.put(i, whole);
+    diagonals_[i] = lattice.diagonal(blocks[i]);
   });
   Real lookups = 0;
-  for (std::size_t i = 0; i < blocks.size(); ++i) lookups += cells_[i].majorant * lattice.volume(blocks[i]);
+  for (std::size_t i = 0; i < blocks.size(); ++i) lookups += rate(i) * lattice.volume(blocks[i]);
   cost_ = (4 * lookups + 2 * cuts) / lattice.surface(lattice.whole());
 }
 
-void TreeMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& out) const {
-  out.clear();
-  out.crossing = crossing_;
-  if (!(world.length() > 0)) return;
-  struct Pending {
-    std::uint32_t node;
-    Real end;
-  };
-  std::array<Pending, kDeepest> pending;
-  std::size_t waiting = 0;
-  std::uint32_t at = 0;
-  Real from = world.begin, end = world.end;
-  for (;;) {
-    const Node& node = nodes_[at];
+void TreeMajorant::start(Walk& walk, const Ray& world, const Ray& local) const {
+  walk.local = local;
+  walk.from = world.begin;
+  walk.end = world.end;
+  walk.at = 0;
+  walk.waiting = 0;
+  walk.ended = !(world.length() > 0);
+}
+
+template <class Visit>
+bool TreeMajorant::walk(Walk& walk, const Visit& visit) const {
+  while (!walk.ended) {
+    const Node& node = nodes_[walk.at];
     if (node.axis == kCell) {
-      const Cell& cell = cells_[node.first];
-      out.segments.push_back({from, end, cell.majorant, cell.extinction, cell.diagonal});
-      if (waiting == 0) return;
-      from = end;
-      at = pending[--waiting].node;
-      end = pending[waiting].end;
+      const Real end = walk.end;
+      walk.ended = walk.waiting == 0;
+      if (!walk.ended) {
+        walk.from = end;
+        walk.at = walk.pending[--walk.waiting].node;
+        walk.end = walk.pending[walk.waiting].end;
+      }
+      if (!visit(end, node.first)) return true;
       continue;
     }
-    const Real origin = local.origin[node.axis], direction = local.direction[node.axis];
+    const Real origin = walk.local.origin[node.axis], direction = walk.local.direction[node.axis];
     if (direction == 0) {
-      at = node.first + (origin < node.plane ? 0 : 1);
+      walk.at = node.first + (origin < node.plane ? 0 : 1);
       continue;
     }
     const Real crossing = (node.plane - origin) / direction;
     const std::uint32_t near = node.first + (direction > 0 ? 0 : 1), far = node.first + (direction > 0 ? 1 : 0);
     // Strict on both sides, so that no segment is empty.
-    if (!(crossing > from)) {
-      at = far;
-    } else if (!(crossing < end)) {
-      at = near;
+    if (!(crossing > walk.from)) {
+      walk.at = far;
+    } else if (!(crossing < walk.end)) {
+      walk.at = near;
     } else {
-      pending[waiting++] = {far, end};
-      at = near;
-      end = crossing;
+      walk.pending[walk.waiting++] = {far, walk.end};
+      walk.at = near;
+      walk.end = crossing;
     }
   }
+  return false;
 }
+
+void TreeMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& out) const {
+  out.clear();
+  out.crossing = crossing_;
+  Walk along;
+  start(along, world, local);
+  Real from = world.begin;
+  walk(along, [&](Real end, std::size_t cell) {
+    out.segments.push_back({from, end, rate(cell), cells_[cell], diagonals_[cell]});
+    from = end;
+    return true;
+  });
+}
+
+std::unique_ptr<Traversal> TreeMajorant::traversal() const { return std::make_unique<CellTraversal<TreeMajorant>>(*this); }
 
 }  // namespace nullmark

@@ -4,6 +4,7 @@
 
 #include "media/base/registry.h"
 #include "media/majorants/bound_lattice.h"
+#include "media/majorants/bounds_table.h"
 #include "media/majorants/crossing.h"
 
 namespace nullmark {
@@ -25,10 +26,31 @@ class TreeMajorant : public MajorantStructure {
   static constexpr int kDeepest = 60;
 
   void segments(const Ray& world, const Ray& local, SegmentBuffer& out) const final;
+  std::unique_ptr<Traversal> traversal() const final;
+  Crossing crossing() const final { return crossing_; }
 
   StructureSize size() const final {
-    return {cells_.size(), nodes_.size(), sizeof *this + nodes_.size() * sizeof(Node) + cells_.size() * sizeof(Cell)};
+    return {cells_.cells(), nodes_.size(),
+            sizeof *this + nodes_.size() * sizeof(Node) + cells_.bytes() + diagonals_.size() * sizeof(Real)};
   }
+
+  /// Where a walk along a ray stands: in the node `at` between `from` and `end`, with nodes behind it that wait.
+  struct Walk {
+    struct Pending {
+      std::uint32_t node;
+      Real end;
+    };
+    Ray local;
+    Real from = 0, end = 0;
+    std::uint32_t at = 0;
+    std::size_t waiting = 0;
+    bool ended = true;
+    std::array<Pending, kDeepest> pending;
+  };
+  void start(Walk& walk, const Ray& world, const Ray& local) const;
+  template <class Visit>
+  bool walk(Walk& walk, const Visit& visit) const;
+  Real rate(std::size_t cell) const { return looseness_ * cells_.largest(cell); }
 
   /// Lookups of ratio tracking plus crossings from cell to cell, averaged over isotropic uniform lines through the world box:
   /// (4 sum k_i V_i + 2 sum |planes|) / S, with k_i, V_i a cell's majorant and volume, |planes| the areas of the cuts and S the
@@ -46,14 +68,11 @@ class TreeMajorant : public MajorantStructure {
     std::uint32_t axis = 0;   // kCell: a leaf
     std::uint32_t first = 0;  // node below the plane, followed by the one above; or index of the cell
   };
-  struct Cell {
-    Extrema extinction;
-    Real majorant = 0, diagonal = 0;
-  };
 
   std::vector<Node> nodes_;
-  std::vector<Cell> cells_;
-  Real cost_ = 0;
+  BoundsTable cells_;
+  std::vector<Real> diagonals_;
+  Real looseness_, cost_ = 0;
   Crossing crossing_;
 };
 

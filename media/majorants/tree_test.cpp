@@ -205,7 +205,7 @@ TEST(TreeMajorant, SizesAreThoseOfABinaryTree) {
   for (const auto& tree : trees(*medium)) {
     const StructureSize size = tree->size();
     EXPECT_EQ(size.nodes, 2 * size.cells - 1);
-    EXPECT_GE(size.bytes, size.cells * sizeof(Extrema) + size.nodes * sizeof(Real));
+    EXPECT_GE(size.bytes, size.cells * 4 * sizeof(Real) + size.nodes * 2 * sizeof(Real));
   }
   EXPECT_EQ(OctreeMajorant(*medium, {.max_depth = 3, .forced_depth = 3}, 1).size().cells, 512u);
   EXPECT_EQ(KdTreeMajorant(*medium, {.resolution = {64, 64, 64}, .max_depth = 5, .forced_depth = 5}, 1).size().cells, 32u);

@@ -48,6 +48,7 @@ class Volume : public Medium {
   const VolumeData& data() const { return *data_; }
   Affine world_to_local() const override { return world_to_local_; }
   std::uint64_t content_hash() const override { return data_->content_hash; }
+  bool has_nodes() const override { return true; }
 
  protected:
   std::shared_ptr<const VolumeData> data_;

@@ -22,8 +22,7 @@ struct Scene {
   Scene() {
     context.world = context.local = Ray{{0, 0.5, 0.5}, {1, 0, 0}, 0, 1};
     const Extrema bounds = Extrema::grey(0, 1, 2);
-    context.segments.segments = {{0, 0.5, 2, bounds, 1}, {0.5, 1, 2, bounds, 1}};
-    context.segments.crossing = Crossing::rewind;
+    context.bounds.start({{0, 0.5, 2, bounds, 1}, {0.5, 1, 2, bounds, 1}}, Crossing::rewind);
     workspace.most_lookups = 1000;
     host.begin_ray(*medium, context);
   }

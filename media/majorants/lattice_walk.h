@@ -1,0 +1,76 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "media/base/types.h"
+
+namespace nullmark {
+
+/// Equal cells of a box, `size` wide, told by three numbers below `resolution`.
+struct Lattice {
+  Vec3 lo = Vec3::Zero(), size = Vec3::Ones();
+  std::array<int, 3> resolution{1, 1, 1};
+};
+
+/// 3D-DDA [Amanatides and Woo 1987]: the cells of a lattice along a ray, from one of its points on.
+class LatticeWalk {
+ public:
+  /// Begins in the cell of the point at `from`, or in the nearest one.
+  void start(const Lattice& lattice, const Ray& local, Real from, Real end) {
+    from_ = from;
+    end_ = end;
+    const Vec3 start = local.at(from);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<Eigen::Index>(axis);
+      at_[axis] =
+          std::clamp(static_cast<int>(std::floor((start[k] - lattice.lo[k]) / lattice.size[k])), 0, lattice.resolution[axis] - 1);
+      next_[axis] = crossing(lattice, local, axis);
+    }
+  }
+
+  Real from() const { return from_; }
+
+  /// Calls visit(end, at) for the cells that follow until it returns false (then true) or the walk ends (then false).
+  template <class Visit>
+  bool go_on(const Lattice& lattice, const Ray& local, const Visit& visit) {
+    // What moves is kept apart: what `visit` writes could be anything else.
+    LatticeWalk walk = *this;
+    bool wanted = true;
+    while (wanted && walk.from_ < walk.end_) {
+      const std::array<int, 3> here = walk.at_;
+      const auto& next = walk.next_;
+      const std::size_t axis = next[0] <= next[1] && next[0] <= next[2] ? 0 : next[1] <= next[2] ? 1 : 2;
+      const bool upwards = local.direction[static_cast<Eigen::Index>(axis)] > 0;
+      const bool leaves = upwards ? here[axis] + 1 >= lattice.resolution[axis] : here[axis] == 0;
+      const Real to = leaves ? walk.end_ : std::min(next[axis], walk.end_);
+      if (!leaves) {
+        walk.at_[axis] += upwards ? 1 : -1;
+        walk.next_[axis] = walk.crossing(lattice, local, axis);
+      }
+      if (!(to > walk.from_)) continue;
+      walk.from_ = to;
+      wanted = visit(to, here);
+    }
+    *this = walk;
+    return !wanted;
+  }
+
+ private:
+  /// Where the ray leaves the cell along an axis.  From the plane's index, not accumulated, so that it does not drift over many
+  /// cells.
+  Real crossing(const Lattice& lattice, const Ray& local, std::size_t axis) const {
+    const auto k = static_cast<Eigen::Index>(axis);
+    const Real direction = local.direction[k];
+    if (direction == 0) return kInfinity;
+    return (lattice.lo[k] + (at_[axis] + (direction > 0 ? 1 : 0)) * lattice.size[k] - local.origin[k]) / direction;
+  }
+
+  Real from_ = 0, end_ = 0;
+  std::array<int, 3> at_{};
+  std::array<Real, 3> next_{};
+};
+
+}  // namespace nullmark
