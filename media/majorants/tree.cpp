@@ -2,6 +2,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "media/majorants/list_cells.h"
+
 namespace nullmark {
 
 TreeMajorant::TreeMajorant(const Medium& medium, const BoundLattice& lattice, const Partition& partition, Real looseness,
@@ -88,16 +90,9 @@ bool TreeMajorant::walk(Walk& walk, const Visit& visit) const {
 }
 
 void TreeMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& out) const {
-  out.clear();
-  out.crossing = crossing_;
-  Walk along;
-  start(along, world, local);
-  Real from = world.begin;
-  walk(along, [&](Real end, std::size_t cell) {
-    out.segments.push_back({from, end, rate(cell), cells_[cell], diagonals_[cell]});
-    from = end;
-    return true;
-  });
+  list_cells(
+      *this, world, local, out, [&](std::size_t cell) { return cells_[cell]; },
+      [&](std::size_t cell) { return diagonals_[cell]; });
 }
 
 std::unique_ptr<Traversal> TreeMajorant::traversal() const { return std::make_unique<CellTraversal<TreeMajorant>>(*this); }

@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "media/majorants/list_cells.h"
 #include "media/majorants/medium_bounds.h"
 
 namespace nullmark {
@@ -100,16 +101,8 @@ bool VdbNodesMajorant::walk(Walk& walk, const Visit& visit) const {
 }
 
 void VdbNodesMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& out) const {
-  out.clear();
-  out.crossing = crossing_;
-  Walk along;
-  start(along, world, local);
-  Real from = world.begin;
-  walk(along, [&](Real end, std::size_t cell) {
-    out.segments.push_back({from, end, rate(cell), cells_[cell], diagonal_});
-    from = end;
-    return true;
-  });
+  list_cells(
+      *this, world, local, out, [&](std::size_t cell) { return cells_[cell]; }, [&](std::size_t) { return diagonal_; });
 }
 
 std::unique_ptr<Traversal> VdbNodesMajorant::traversal() const {
