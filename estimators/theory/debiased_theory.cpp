@@ -6,6 +6,7 @@
 
 #include "estimators/theory/log_factorial.h"
 #include "estimators/theory/march_law.h"
+#include "media/base/lanes.h"
 
 namespace nullmark {
 namespace {
@@ -44,40 +45,67 @@ Law gauss_rule(const Law& law, Eigen::Index size) {
 
 constexpr int kMostOrder = 28;
 
+/// Coefficients of a polynomial in s, by their power; as many as fill whole registers.
+constexpr std::size_t kPowers = 32;
+static_assert(kPowers > kMostOrder);
+using Coefficients = std::array<Real, kPowers>;
+
+/// Weight of the k-th mean of symmetric products of n differences, for all k <= n.
+Coefficients series_weights(int n) {
+  Coefficients weight{1};
+  Real choose = 1;
+  for (int k = 1; k <= n; ++k) {
+    choose *= static_cast<Real>(n - k + 1) / k;
+    weight[static_cast<std::size_t>(k)] = 20 * std::exp2(-k) / choose;
+  }
+  return weight;
+}
+
 /// E[e_k e_l] of N pairs (X - x, X - z), for all k, l <= N: coefficients of (1 + s a + t b + s t c)^N.
 class SymmetricMoments {
  public:
-  SymmetricMoments(Real a, Real b, Real c) : a_(a), b_(b), c_(c) { at_[0][0] = 1; }
+  SymmetricMoments(Real a, Real b, Real c) : a_(a), b_(b), c_(c) { power(0)[0] = 1; }
 
   void add_one() {
     ++count_;
-    for (std::size_t k = count_; k <= count_; --k)
-      for (std::size_t l = count_; l <= count_; --l)
-        at_[k][l] +=
-            (k > 0 ? a_ * at_[k - 1][l] : 0) + (l > 0 ? b_ * at_[k][l - 1] : 0) + (k > 0 && l > 0 ? c_ * at_[k - 1][l - 1] : 0);
+    // Downwards, so that what is read has not been replaced.
+    for (std::size_t l = count_ + 1; l-- > 0;)
+      for (std::size_t block = count_ / kWidth + 1; block-- > 0;) {
+        Real* const own = power(l) + block * kWidth;
+        Pack sum = Pack::load(own) + Pack(a_) * Pack::load(own - 1);
+        if (l > 0) {
+          const Real* const before = power(l - 1) + block * kWidth;
+          sum += Pack(b_) * Pack::load(before) + Pack(c_) * Pack::load(before - 1);
+        }
+        sum.store(own);
+      }
   }
 
-  /// E[sum_k a_k m_k sum_l a_l m_l], m_k over n differences: the N others and, where N = n - 1, the pivots' own.
-  Real series(int n, Real first, Real second) const {
-    std::array<Real, kMostOrder + 1> weight{1};
-    Real choose = 1;
-    for (int k = 1; k <= n; ++k) {
-      choose *= static_cast<Real>(n - k + 1) / k;
-      weight[static_cast<std::size_t>(k)] = 20 * std::exp2(-k) / choose;
+  /// E[sum_k a_k m_k sum_l a_l m_l], m_k over n differences, of weights a: the N others and, where N = n - 1, the pivots' own.
+  Real series(const Coefficients& weight, Real first, Real second) const {
+    const auto with = [&](std::size_t k, Real own) { return weight[k] + (k + 1 < kPowers ? own * weight[k + 1] : 0); };
+    Coefficients sums{};
+    for (std::size_t l = 0; l <= count_; ++l) {
+      const Pack factor(with(l, second));
+      for (std::size_t k = 0; k <= count_; k += kWidth)
+        (Pack::load(&sums[k]) + factor * Pack::load(power(l) + k)).store(&sums[k]);
     }
     Real sum = 0;
-    for (std::size_t k = 0; k <= static_cast<std::size_t>(n); ++k)
-      for (std::size_t l = 0; l <= static_cast<std::size_t>(n); ++l)
-        sum += weight[k] * weight[l] *
-               (at_[k][l] + (k > 0 ? first * at_[k - 1][l] : 0) + (l > 0 ? second * at_[k][l - 1] : 0) +
-                (k > 0 && l > 0 ? first * second * at_[k - 1][l - 1] : 0));
+    for (std::size_t k = 0; k <= count_; ++k) sum += with(k, first) * sums[k];
     return sum;
   }
 
  private:
+  static constexpr std::size_t kWidth = kNativeLanes<Real>;
+  using Pack = Lanes<Real, kWidth>;
+
+  /// Coefficients of t^l by powers of s; one below the first is 0.
+  Real* power(std::size_t l) { return &at_[l * (kPowers + 1) + 1]; }
+  const Real* power(std::size_t l) const { return &at_[l * (kPowers + 1) + 1]; }
+
   Real a_, b_, c_;
   std::size_t count_ = 0;
-  std::array<std::array<Real, kMostOrder + 1>, kMostOrder + 1> at_{};
+  std::array<Real, kPowers*(kPowers + 1) + 1> at_{};
 };
 
 }  // namespace
@@ -104,6 +132,11 @@ std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Re
   std::array<Real, kMostOrder + 1> chance{0.9, 0, 0.1};
   for (std::size_t n = 3; n <= kMostOrder; ++n) chance[n] = chance[n - 1] * 2 / static_cast<Real>(n);
   for (std::size_t n = 2; n < kMostOrder; ++n) chance[n] -= chance[n + 1];
+  static const auto kWeights = [] {
+    std::array<Coefficients, kMostOrder + 1> weights;
+    for (int n = 0; n <= kMostOrder; ++n) weights[static_cast<std::size_t>(n)] = series_weights(n);
+    return weights;
+  }();
   const Real spread = depth->variance();
   constexpr Real kFirstOrder = 1e-12;
   if (spread < kFirstOrder) {
@@ -131,12 +164,13 @@ std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Re
       const Real both = rule.w[i] * rule.w[j] * exponential(x + z) * (i == j ? 1 : 2);
       for (int n = 0; n < orders; ++n) {
         const Real p = chance[static_cast<std::size_t>(n)] / (n + 1);
+        const Coefficients& weights = kWeights[static_cast<std::size_t>(n)];
         if (n > 0) {
-          if (p > 0) square += n * p * both * others.series(n, z - x, x - z);
+          if (p > 0) square += n * p * both * others.series(weights, z - x, x - z);
           others.add_one();
         }
         if (i == j) {
-          square += p * rule.w[i] * exponential(2 * x) * others.series(n, 0, 0);
+          square += p * rule.w[i] * exponential(2 * x) * others.series(weights, 0, 0);
           Real terms = 1;
           for (int k = 1; k <= n; ++k) terms += 20 * std::pow(a / 2, k);
           first += (n + 1) * p * rule.w[i] * exponential(x) * terms;
@@ -162,11 +196,12 @@ std::optional<Real> telescoping_variance(const RayProfile& profile, int c, Real 
     const std::vector<Real> mu = combs(profile, c, count, nodes->x);
     Real squares = 0, base_mean = 0, march_mean = 0;
     for (std::size_t i = 0; i < nodes->x.size(); ++i) {
-      Real base = 0, even = 0, odd = 0;
-      for (std::size_t j = 0; j < k; ++j) {
-        base += exponential(-mu[i * k + j] * length) / count;
-        (j % 2 == 0 ? even : odd) += mu[i * k + j] * length * 2 / count;
-      }
+      const Real base = sum_in_lanes<Real>(k, [&](std::size_t j, auto pack) {
+        using Pack = decltype(pack);
+        return std::array{exponential(Pack(-length) * Pack::load(&mu[i * k + j]))};
+      })[0] / count;
+      Real even = 0, odd = 0;
+      for (std::size_t j = 0; j < k; ++j) (j % 2 == 0 ? even : odd) += mu[i * k + j] * length * 2 / count;
       const Real difference = march_difference(even, odd), error = base - truth + difference / p;
       variance += nodes->w[i] * p * error * error;
       squares += nodes->w[i] * difference * difference / p;

@@ -1,10 +1,13 @@
 #include "estimators/theory/guided_theory.h"
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "estimators/theory/kinks.h"
 #include "estimators/theory/panel_rule.h"
+#include "media/base/lanes.h"
 
 namespace nullmark {
 namespace {
@@ -65,23 +68,23 @@ Theory guided_moments(const Rates& majorant, const RayProfile& profile, int c, R
     extra = 1;
   }
 
+  // Of nodes that are done, times their weights: a^2 E[X^2], 1 + E[N], 1 + 2 E[N] + E[N^2] from there on.
   std::vector<Real> square(count), ahead(count), ahead_square(count);
   struct Sums {
     Real square, ahead, ahead_square;
   };
   // What nodes from `from` on add at depth s for the rate q.
   const auto later = [&](Real s, Real q, std::size_t from) {
-    Sums sums{std::exp((q - 2) * (total - s)), 0, 0};
     constexpr Real kVanished = 40;
-    for (std::size_t j = from; j < count; ++j) {
-      const Real ds = depth[j] - s;
-      if (q * ds > kVanished) break;
-      const Real flight = weight[j] * std::exp(-q * ds);
-      sums.square += flight * std::exp(2 * (q - 1) * ds) * null[j] * null[j] / q * square[j];
-      sums.ahead += flight * q * (1 + ahead[j]);
-      sums.ahead_square += flight * q * (1 + 2 * ahead[j] + ahead_square[j]);
-    }
-    return sums;
+    const auto begin = depth.begin() + static_cast<std::ptrdiff_t>(from);
+    const auto n = static_cast<std::size_t>(std::upper_bound(begin, depth.end(), s + kVanished / q) - begin);
+    const auto sums = sum_in_lanes<Real>(n, [&](std::size_t i, auto pack) {
+      using Pack = decltype(pack);
+      const Pack ds = Pack::load(&depth[from + i]) - Pack(s), flown = exponential(Pack(-q) * ds);
+      return std::array{flown * exponential(Pack(2 * (q - 1)) * ds) * Pack::load(&square[from + i]),
+                        flown * Pack::load(&ahead[from + i]), flown * Pack::load(&ahead_square[from + i])};
+    });
+    return Sums{std::exp((q - 2) * (total - s)) + sums[0] / q, q * sums[1], q * sums[2]};
   };
   for (std::size_t panel = count / kNodes; panel-- > 0;) {
     const std::size_t from = panel * kNodes;
@@ -110,9 +113,9 @@ Theory guided_moments(const Rates& majorant, const RayProfile& profile, int c, R
     const Column r = solver.solve(sum_square + kernel * (Column::Ones() + 2 * l));
     for (int i = 0; i < kNodes; ++i) {
       const std::size_t at = from + static_cast<std::size_t>(i);
-      square[at] = u[i];
-      ahead[at] = l[i];
-      ahead_square[at] = r[i];
+      square[at] = weight[at] * null[at] * null[at] * u[i];
+      ahead[at] = weight[at] * (1 + l[i]);
+      ahead_square[at] = weight[at] * (1 + 2 * l[i] + r[i]);
     }
   }
   const Sums sums = later(0, first_rate, 0);

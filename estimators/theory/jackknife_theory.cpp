@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <boost/math/quadrature/gauss.hpp>
 #include <boost/math/special_functions/bessel.hpp>
@@ -7,6 +8,7 @@
 
 #include "estimators/theory/debiased_theory.h"
 #include "estimators/theory/march_law.h"
+#include "media/base/lanes.h"
 
 namespace nullmark {
 namespace {
@@ -41,9 +43,14 @@ Complex complex_log1p(Complex z) { return {std::log1p(2 * z.real() + std::norm(z
 Complex MarchLaw::log_characteristic(Complex s) const {
   Complex sum = 0;
   for (const Law& law : parts) {
-    Complex z = 0;
-    for (std::size_t i = 0; i < law.x.size(); ++i) z += law.w[i] * complex_expm1(s * law.x[i]);
-    sum += complex_log1p(z);
+    // The mean of e^{s x} - 1, as in complex_expm1.
+    const auto [real, imaginary] = sum_in_lanes<Real>(law.x.size(), [&](std::size_t i, auto pack) {
+      using Pack = decltype(pack);
+      const Pack x = Pack::load(&law.x[i]), w = Pack::load(&law.w[i]), growth = Pack(s.real()) * x, turn = Pack(s.imag()) * x;
+      const Pack half = sine(turn * Pack(.5)), less = one_minus_exponential(growth);
+      return std::array{-w * (less * cosine(turn) + Pack(2) * half * half), w * (Pack(1) - less) * sine(turn)};
+    });
+    sum += complex_log1p({real, imaginary});
   }
   return sum;
 }
@@ -56,26 +63,28 @@ class Characteristic {
       const Real angle = std::numbers::pi * (static_cast<Real>(k) + .5) / kPoints;
       u_[k] = std::cos(angle);
       weight_[k] = (k % 2 == 0 ? 1 : -1) * std::sin(angle);
-      value_[k] = k < kPoints / 2 ? complex_expm1(march.log_characteristic({real, u_[k]})) : std::conj(value_[kPoints - 1 - k]);
+      const std::size_t opposite = kPoints - 1 - k;
+      const Complex value = k < kPoints / 2 ? complex_expm1(march.log_characteristic({real, u_[k]}))
+                                            : Complex(real_[opposite], -imaginary_[opposite]);
+      real_[k] = value.real();
+      imaginary_[k] = value.imag();
     }
   }
 
   Complex operator()(Real u) const {
-    Complex above = 0;
-    Real below = 0;
-    for (std::size_t k = 0; k < kPoints; ++k) {
-      if (u == u_[k]) return value_[k];
-      const Real w = weight_[k] / (u - u_[k]);
-      above += w * value_[k];
-      below += w;
-    }
-    return above / below;
+    const auto [real, imaginary, below] = sum_in_lanes<Real>(kPoints, [&](std::size_t k, auto pack) {
+      using Pack = decltype(pack);
+      const Pack w = Pack::load(&weight_[k]) / (Pack(u) - Pack::load(&u_[k]));
+      return std::array{w * Pack::load(&real_[k]), w * Pack::load(&imaginary_[k]), w};
+    });
+    if (std::isfinite(below)) return Complex(real, imaginary) / below;
+    const auto k = static_cast<std::size_t>(std::find(u_.begin(), u_.end(), u) - u_.begin());
+    return {real_[k], imaginary_[k]};
   }
 
  private:
   static constexpr std::size_t kPoints = 48;
-  std::array<Real, kPoints> u_, weight_;
-  std::array<Complex, kPoints> value_;
+  std::array<Real, kPoints> u_, weight_, real_, imaginary_;
 };
 
 /// Nodes on [0, 1] of a Gauss-Legendre rule.

@@ -248,8 +248,12 @@ RunObserver observer_of(Journal* journal, Progress& progress, RunContext& contex
   observer.cell_timed = [journal](const CellRecord& record) {
     if (journal) journal->append(record);
   };
+  observer.settled = [journal] {
+    if (journal) journal->settle();
+  };
   observer.verdict_share = [&context](double share) { context.verdict_share = share; };
   observer.statistics_share = [&context](double share) { context.statistics_share = share; };
+  observer.phase = [&context](const Phase& phase) { context.phases.push_back(phase); };
   observer.warning = [&progress](const std::string& message) { progress.warning(message); };
   return observer;
 }

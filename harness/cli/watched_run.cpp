@@ -41,6 +41,10 @@ class FinishedCells {
       observer.cell_timed(record);
       cells_[record.cell.name] = record;
     };
+    keeps.settled = [this, &observer] {
+      const std::lock_guard lock(mutex_);
+      observer.settled();
+    };
     keeps.progress = [this, &observer](const CellRecord& record, double fraction) {
       if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) observer.progress(record, fraction);
     };

@@ -83,13 +83,16 @@ std::string read_file(const std::string& path) {
   return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path) : text;
 }
 
-void write_durably(int file, const std::string& text, const std::string& path) {
+void write_all(int file, const std::string& text, const std::string& path) {
   for (std::size_t done = 0; done < text.size();) {
     const ssize_t written = ::write(file, text.data() + done, text.size() - done);
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) fail(path, "written");
     done += static_cast<std::size_t>(written);
   }
+}
+
+void make_durable(int file, const std::string& path) {
   // Pipes and devices know no fsync.
   if (::fsync(file) != 0 && errno != EINVAL && errno != EROFS) fail(path, "written");
 }
@@ -101,7 +104,8 @@ void write_atomically(const std::string& path, const std::string& text) {
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file < 0) fail(path, "written");
   try {
-    write_durably(file, text, path);
+    write_all(file, text, path);
+    make_durable(file, path);
   } catch (...) {
     ::close(file);
     ::unlink(temporary.c_str());

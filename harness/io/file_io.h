@@ -17,7 +17,10 @@ void expect_replaceable(const std::string& path);
 /// Removes temporary files that processes left when they were killed in `write_atomically` of this path.
 void remove_leftovers(const std::string& path);
 
-/// Writes the whole text to an open file and syncs it to disk.  Throws InputError.
-void write_durably(int file, const std::string& text, const std::string& path);
+/// Writes the whole text to an open file, from where a power cut can still lose it.  Throws InputError.
+void write_all(int file, const std::string& text, const std::string& path);
+
+/// Puts on disk what was written to an open file.  Throws InputError.
+void make_durable(int file, const std::string& path);
 
 }  // namespace nullmark

@@ -84,7 +84,10 @@ std::optional<Cost> cost_of(const CellRecord& record) {
   if (record.lookups_per_sample) cost.variance_x_lookups = product(cost.variance, exactly(*record.lookups_per_sample));
   if (record.time) cost.ns_per_sample = median_interval(record.time->repetition_ns);
   if (cost.ns_per_sample) cost.ns_by_batch = times_by_batch(*record.time, *cost.ns_per_sample);
-  if (cost.ns_per_sample) cost.variance_x_ns = product(cost.variance, *cost.ns_per_sample);
+  if (cost.ns_per_sample) {
+    cost.variance_x_ns = product(cost.variance, *cost.ns_per_sample);
+    if (const auto& [samples, ns] = cost.ns_by_batch.front(); samples == 1) cost.variance_x_ns_alone = product(cost.variance, ns);
+  }
   if (!stands_unbiased(record) && errors_known)
     cost.floor = floor_of(record, mean_square_error / channels, cost.variance.value, cost.reference);
   return cost;

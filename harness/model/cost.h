@@ -23,6 +23,7 @@ struct Cost {
   /// Cost of a sample by the number that share a walk through the majorant structure, ascending; the last is ns_per_sample.
   std::vector<std::pair<std::uint64_t, Interval>> ns_by_batch;
   std::optional<Interval> variance_x_lookups, variance_x_ns;
+  std::optional<Interval> variance_x_ns_alone;  ///< by the time of a sample that shares that walk with no other
   /// Relative error that no number of samples removes, from the rays' errors, of cells that do not stand as unbiased.
   std::optional<Interval> floor;
 };

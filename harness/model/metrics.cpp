@@ -133,6 +133,14 @@ Maybe rmse_error(const CellRecord& record) {
 }
 Maybe exact(const CellRecord&) { return 0; }
 
+Maybe ns_per_sample_alone(const CellRecord& record) {
+  if (!record.time) return std::nullopt;
+  if (record.time->samples_per_traversal == 1) return record.time->ns_per_sample;
+  for (const BatchTime& batch : record.time->batches)
+    if (batch.samples_per_traversal == 1) return batch.ns_per_sample;
+  return std::nullopt;
+}
+
 /// A metric: its value in a record, what theory says of it, and its standard error; null where there is none.
 struct Metric {
   using Value = Maybe (*)(const CellRecord&);
@@ -156,6 +164,7 @@ const std::vector<Metric>& metrics() {
       {"kurtosis", [](Record r) { return channel_average(r, &Channel::kurtosis); }},
       {"relative_variance", [](Record r) { return channel_average(r, &Channel::relative_variance); }},
       {"ns_per_sample", [](Record r) { return r.time ? Maybe(r.time->ns_per_sample) : std::nullopt; }},
+      {"ns_per_sample_alone", ns_per_sample_alone},
       {"ns_per_lookup", [](Record r) -> Maybe { return r.time ? Maybe(r.time->ns_per_lookup) : std::nullopt; }},
       {"lookups_per_sample", [](Record r) -> Maybe { return r.lookups_per_sample; },
        [](Record r) -> Maybe { return r.lookups_theory; }, lookups_error, "lookups_theory"},

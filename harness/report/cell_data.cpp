@@ -35,6 +35,7 @@ Json per_output(const CellRecord& record, std::optional<Real> ChannelRecord::*me
 Json time_row(const CellRecord& record) {
   if (!record.time) return nullptr;
   return {{"ns_per_sample", interval(median_interval(record.time->repetition_ns))},
+          {"ns_per_sample_alone", number_or_null(metric(record, "ns_per_sample_alone"))},
           {"ns_per_lookup", number_or_null(record.time->ns_per_lookup)},
           {"floor_ratio", number_or_null(record.time->floor_ratio)},
           {"loop_ratio", number_or_null(record.time->loop_ratio)}};
@@ -96,6 +97,7 @@ Json cost_json(const RankedCell& ranked) {
           {"variance", interval(cost.variance)},
           {"variance_x_lookups", interval(cost.variance_x_lookups)},
           {"variance_x_ns", interval(cost.variance_x_ns)},
+          {"variance_x_ns_alone", interval(cost.variance_x_ns_alone)},
           {"floor", interval(cost.floor)},
           {"seconds", std::move(seconds)},
           {"pareto", ranked.pareto}};

@@ -120,6 +120,7 @@ Row csv_row(const CellRecord& record, std::size_t c) {
           {"largest_sample", csv_number(record.largest_sample)},
           {"nonfinite", fmt::to_string(record.nonfinite)},
           {"ns_per_sample", csv_number(metric(record, "ns_per_sample"))},
+          {"ns_per_sample_alone", csv_number(metric(record, "ns_per_sample_alone"))},
           {"ns_per_lookup", csv_number(metric(record, "ns_per_lookup"))},
           {"variance_x_lookups", csv_number(sampled ? variance_x_lookups(record, c) : std::nullopt)},
           {"variance_x_ns", csv_number(sampled ? variance_x_ns(record, c) : std::nullopt)},

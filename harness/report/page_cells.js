@@ -27,6 +27,7 @@ function sceneOfCell(cell) {
 }
 
 const nanosecondsOf = (cell) => cell.time?.ns_per_sample?.value ?? null;
+const nanosecondsAloneOf = (cell) => cell.time?.ns_per_sample_alone ?? null;
 const firstOf = (key) => (cell) => cell[key][0] ?? null;
 
 /** Columns of the table of every cell: how they are shown, and by what they are sorted. */
@@ -42,7 +43,10 @@ const cellColumns = [
   { title: "RMSE", show: perOutput("rmse"), sort: firstOf("rmse") },
   { title: "variance", show: perOutput("variance"), sort: firstOf("variance") },
   { title: "lookups", show: single("lookups", (cell) => cell.lookups), sort: (cell) => cell.lookups },
-  ...(anythingTimed ? [{ title: "ns a sample", show: single("ns_per_sample", nanosecondsOf), sort: nanosecondsOf }] : []),
+  ...(anythingTimed ? [
+    { title: "ns a sample", show: single("ns_per_sample", nanosecondsOf), sort: nanosecondsOf },
+    { title: "alone", show: single("ns_per_sample_alone", nanosecondsAloneOf), sort: nanosecondsAloneOf },
+  ] : []),
   { title: "samples a ray", show: single("samples", (cell) => cell.verdict?.samples_per_ray ?? cell.samples_per_ray), sort: (cell) => cell.samples_per_ray },
   { title: "rays, light", show: textOf(sceneOfCell), sort: sceneOfCell },
   { title: "why", show: textOf(verdictReason), sort: verdictReason },

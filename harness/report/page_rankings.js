@@ -34,6 +34,7 @@ const rankingColumns = [
   { title: "seconds to\u00a00.1\u00a0%", timed: true, of: (_, __, cell) => reachedText(cell, 1) },
   { title: "variance", of: (_, __, cell) => intervalText(cell.cost?.variance) },
   { title: "variance × ns", timed: true, of: (_, __, cell) => intervalText(cell.cost?.variance_x_ns) },
+  { title: "variance × ns, alone", timed: true, of: (_, __, cell) => intervalText(cell.cost?.variance_x_ns_alone) },
   { title: "variance × lookups", of: (_, __, cell) => intervalText(cell.cost?.variance_x_lookups) },
   { title: "floor of the error", of: (_, __, cell) => (floorText(cell) ? intervalText(cell.cost.floor, formatPercent) : "") },
   { title: "cheaper than the best unbiased until", timed: true, of: (scene, entry) => breakEvenText(scene, entry.cell) },

@@ -77,7 +77,8 @@ Line channel_line(const CellRecord& record, std::size_t c) {
           short_number(unless_rounding(channel, channel.variance_theory)),
           once(record.lookups_per_sample),
           once(record.lookups_theory),
-          once(metric(record, "ns_per_lookup")),
+          once(metric(record, "ns_per_sample_alone")),
+          once(metric(record, "ns_per_sample")),
           once(record.time ? std::optional(record.time->floor_ratio) : std::nullopt),
           short_number(variance_x_ns(record, c)),
           first ? marked_word(record) : "",
@@ -161,7 +162,7 @@ std::string results_tables(const RunRecord& run) {
   bool marked = false, uncertain = false;
   for (const auto& [title, records] : grouped(run.cells, heading)) {
     std::vector<Line> lines = {{"estimator", "rmse", "bias", "variance", "variance theory", "lookups", "lookups theory",
-                                "ns/lookup", "floor ratio", "variance x ns", "verdict", "status"}};
+                                "ns/sample alone", "ns/sample", "floor ratio", "variance x ns", "verdict", "status"}};
     for (const CellRecord* record : records) {
       append_lines(*record, lines);
       for (const ChannelRecord& channel : record->channel) {

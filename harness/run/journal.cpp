@@ -132,13 +132,16 @@ void Journal::read_line(const std::string& line, const std::string& where, const
 void Journal::write_head(const std::string& config_hash) {
   const Json head = {
       {kHead, kJournalSchema}, {kVersionKey, RunRecord::kVersion}, {"config_hash", config_hash}, {"build", build_json(build_)}};
-  write_durably(file_, head.dump() + "\n", path_);
+  write_all(file_, head.dump() + "\n", path_);
+  make_durable(file_, path_);
 }
 
 void Journal::append(const CellRecord& record) {
   holds_cells_ = true;
-  write_durably(file_, cell_json(record).dump() + "\n", path_);
+  write_all(file_, cell_json(record).dump() + "\n", path_);
 }
+
+void Journal::settle() { make_durable(file_, path_); }
 
 void Journal::remove() {
   // Under the lock, so that no other run can have begun to use the file.

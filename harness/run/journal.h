@@ -8,9 +8,9 @@
 
 namespace nullmark {
 
-/// The finished cells of a running run, one line each, beside its future results file: RESULTS.journal.  Every line is on disk
-/// before `append` returns, so a killed run loses at most the cells in progress.  The open journal is also a lock against a
-/// second run with the same results file.
+/// The finished cells of a running run, one line each, beside its future results file: RESULTS.journal.  A killed run loses at
+/// most the cells in progress, a power cut also those that were appended since the journal last settled.  The open journal is
+/// also a lock against a second run with the same results file.
 class Journal {
  public:
   enum class Mode {
@@ -33,6 +33,8 @@ class Journal {
   const std::vector<CellRecord>& cells() const { return cells_; }
 
   void append(const CellRecord& record);
+  /// Puts on disk what was appended.
+  void settle();
 
   /// Call once the results file is in place.
   void remove();

@@ -135,6 +135,9 @@ std::map<std::string, std::string> make_provenance(const RunContext& context, st
       {"selected", text(context.selected)},
       {"start", text(iso_time(context.start))},
       {"seconds", text(seconds)}};
+  Json phases = Json::object();
+  for (const Phase& phase : context.phases) phases[phase.name] = {{"seconds", phase.wall}, {"cpu_seconds", phase.cpu}};
+  provenance["phases"] = text(phases);
   if (const Json other = plugin(); !other.is_null()) provenance["plugin"] = text(other);
   if (!context.filter.empty()) provenance["filter"] = text(context.filter);
   if (context.covering) provenance["covering"] = text(true);

@@ -9,6 +9,7 @@
 
 #include "harness/model/plan.h"
 #include "harness/model/record.h"
+#include "harness/run/run.h"
 
 namespace nullmark {
 
@@ -22,6 +23,7 @@ struct RunContext {
       0;  ///< cells that the filter and the covering subset select, over all shards, and cells that were there before
   /// Time of the verdicts' evidence, and of all statistics, divided by that of the sampling.
   std::optional<double> verdict_share, statistics_share;
+  std::vector<Phase> phases;
   std::vector<std::uint64_t> seeds;
   std::chrono::system_clock::time_point start = std::chrono::system_clock::now();
 };

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <functional>
@@ -137,7 +138,10 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
   const Families families{mean_family(plan), lookups_family(plan), laws_family(plan)};
   std::vector<CellOutcome> outcomes(cells.size());
   std::mutex telling;
-  Background teller;
+  Background teller([&] {
+    const std::lock_guard lock(telling);
+    observer.settled();
+  });
   std::size_t done = 0;
   std::atomic<bool> failed = false;
   const auto given_up = [&] { return stop() || failed || teller.failed(); };
@@ -161,6 +165,31 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
   return outcomes;
 }
 
+/// Tells what each phase took, one after another.
+class PhaseClock {
+ public:
+  explicit PhaseClock(const RunObserver& observer) : observer_(observer) {}
+
+  void end(const char* name) {
+    const Clock::time_point wall = Clock::now();
+    const double cpu = cpu_seconds();
+    observer_.phase({name, std::chrono::duration<double>(wall - wall_).count(), cpu - cpu_});
+    wall_ = wall;
+    cpu_ = cpu;
+  }
+
+ private:
+  static double cpu_seconds() {
+    timespec time{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
+
+  const RunObserver& observer_;
+  Clock::time_point wall_ = Clock::now();
+  double cpu_ = cpu_seconds();
+};
+
 using Records = std::map<std::size_t, CellRecord>;  // by place in the plan
 
 void time_records(const std::vector<const PreparedCell*>& cells, const TimingPlan& plan, Records& records,
@@ -176,6 +205,7 @@ void time_records(const std::vector<const PreparedCell*>& cells, const TimingPla
     record.time->majorant_build_seconds = cells[i]->scene->majorant->build_seconds;
     observer.cell_timed(record);
   }
+  observer.settled();
 }
 
 /// Throws InputError where a finished cell was sampled in other data than its medium has now.
@@ -237,6 +267,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     for (const CellRecord& record : finished)
       if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = record;
 
+  PhaseClock clock(observer);
   const bool timing = options.timing && plan.timing.enabled;
   CellPreparer preparer(plan);
   expect_same_media(preparer, plan, records);
@@ -252,8 +283,11 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
                record->second.build.empty();
       },
       ended);
+  clock.end("preparation");
   add_theory(cells, ended);
+  clock.end("theory");
   std::vector<CellOutcome> outcomes = run_cells(plan, cells, threads, options, observer, late, stop);
+  clock.end("sampling");
 
   std::vector<const PreparedCell*> to_time;
   to_time.reserve(untimed.size() + cells.size());
@@ -265,7 +299,10 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     if (outcomes[i].record.status == Status::ok) to_time.push_back(&cells[i]);
     records[cells[i].index] = std::move(outcomes[i].record);
   }
-  if (timing && !to_time.empty() && !ended()) time_records(to_time, plan.timing, records, observer, ended);
+  if (timing && !to_time.empty() && !ended()) {
+    time_records(to_time, plan.timing, records, observer, ended);
+    clock.end("timing");
+  }
   if (effort.working > 0) {
     observer.verdict_share(effort.judging / (effort.working - effort.judging));
     observer.statistics_share(effort.statistics / (effort.working - effort.statistics));

@@ -22,6 +22,12 @@ struct RunOptions {
   const std::atomic<int>* interrupted = nullptr;  ///< set to a signal's number to stop after the samples under way
 };
 
+/// What a part of a run took: preparation (of media, bounds, rays, references), theory, sampling (with verdicts), timing.
+struct Phase {
+  std::string name;
+  double wall = 0, cpu = 0;  ///< seconds; cpu: of all threads
+};
+
 /// Called for every cell when its statistics are done, and again when its time is known.  Cells end in any order.  Calls come one
 /// at a time, from any thread.
 struct RunObserver {
@@ -30,8 +36,11 @@ struct RunObserver {
   std::function<void(const CellRecord&, double fraction)> progress = [](const CellRecord&, double) {};
   std::function<void(double fraction)> timing = [](double) {};
   std::function<void(const CellRecord&)> cell_timed = [](const CellRecord&) {};
+  /// No cell waits that `cell_done` or `cell_timed` has yet to be called for.
+  std::function<void()> settled = [] {};
   /// Time of evidence, and of all statistics including evidence, divided by the time of their sampling.
   std::function<void(double)> verdict_share = [](double) {}, statistics_share = [](double) {};
+  std::function<void(const Phase&)> phase = [](const Phase&) {};
   std::function<void(const std::string&)> warning = [](const std::string&) {};
 };
 

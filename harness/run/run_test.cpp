@@ -199,6 +199,18 @@ TEST(Run, ACellThatIsCutOffAfterItsSamplesIsNotDone) {
   EXPECT_FALSE(record.verdict);
 }
 
+TEST(Run, TellsWhatEachPhaseTook) {
+  RunObserver observer;
+  std::vector<std::string> phases;
+  observer.phase = [&](const Phase& phase) {
+    phases.push_back(phase.name);
+    EXPECT_GT(phase.wall, 0);
+    EXPECT_GT(phase.cpu, 0);
+  };
+  run(plan(), 2, observer);
+  EXPECT_EQ(phases, (std::vector<std::string>{"preparation", "theory", "sampling"}));
+}
+
 TEST(Run, StatisticsHoldTheVerdict) {
   RunObserver observer;
   double verdict = -1, statistics = -1;

@@ -4,7 +4,7 @@
 
 namespace nullmark {
 
-Background::Background() : thread_([this] { work(); }) {}
+Background::Background(std::function<void()> drained) : drained_(std::move(drained)), thread_([this] { work(); }) {}
 
 Background::~Background() {
   try {
@@ -31,6 +31,11 @@ void Background::finish() {
   if (const std::exception_ptr error = std::exchange(error_, nullptr)) std::rethrow_exception(error);
 }
 
+bool Background::is_drained() {
+  const std::lock_guard lock(mutex_);
+  return tasks_.empty();
+}
+
 void Background::work() {
   for (;;) {
     std::function<void()> task;
@@ -43,6 +48,7 @@ void Background::work() {
     }
     try {
       task();
+      if (is_drained()) drained_();
     } catch (...) {
       error_ = std::current_exception();
       failed_ = true;

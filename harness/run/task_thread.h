@@ -10,11 +10,11 @@
 
 namespace nullmark {
 
-/// Runs tasks one after another, in order, on a separate thread, so that waiting for a disk does not delay samples.  A task that
-/// throws is the last.
+/// Runs tasks one after another, in order, on a separate thread, so that waiting for a disk does not delay samples.  Whenever none
+/// waits, it calls `drained`: a disk that keeps tasks waiting is asked once for all of them.  A task that throws is the last.
 class Background {
  public:
-  Background();
+  explicit Background(std::function<void()> drained);
   ~Background();
   Background(const Background&) = delete;
   Background& operator=(const Background&) = delete;
@@ -27,7 +27,9 @@ class Background {
 
  private:
   void work();
+  bool is_drained();
 
+  std::function<void()> drained_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<std::function<void()>> tasks_;

@@ -255,16 +255,24 @@ std::optional<TimeRecord> time_record(const TimedCell& cell, std::size_t index, 
   return time;
 }
 
+/// What many samples share hides what each costs as renderers draw it.
+TimingPlan with_a_sample_alone(TimingPlan plan) {
+  std::vector<std::uint64_t>& sizes = plan.samples_per_traversal;
+  if (sizes.front() != 1) sizes.insert(sizes.begin(), 1);
+  return plan;
+}
+
 }  // namespace
 
 Real waiting_share(Real wall_seconds, Real thread_seconds) {
   return wall_seconds > thread_seconds ? 1 - thread_seconds / wall_seconds : 0;
 }
 
-std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& plan,
+std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& asked,
                                                   const std::function<bool()>& stop,
                                                   const std::function<void(double)>& progress) {
   initialise_once();
+  const TimingPlan plan = with_a_sample_alone(asked);
   std::vector<std::optional<TimeRecord>> result(cells.size());
   if (cells.empty()) return result;
   Registration registration(plan);

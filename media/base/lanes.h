@@ -75,6 +75,7 @@ class Lanes {
   friend Lanes one_minus_exponential(Lanes a) { return -Lanes(hn::Expm1(Tag(), a.vector_)); }
   /// At most 3 ulp off, for magnitudes below 39000.
   friend Lanes cosine(Lanes a) { return hn::Cos(Tag(), a.vector_); }
+  friend Lanes sine(Lanes a) { return hn::Sin(Tag(), a.vector_); }
   friend T least_normal(Lanes) { return std::numeric_limits<T>::min(); }
   friend LaneMask<T, N> vanished(Lanes a) { return a == Lanes(0); }
 
@@ -237,6 +238,38 @@ class ClosedRanks {
   }
   decltype(indices<N>()) order_;
 };
+
+/// Sums of the numbers f(i, pack) over 0 <= i < n, an array of packs of the entries from i on, of as many as `pack` has: a whole
+/// register, or one.
+template <class T, class Function>
+auto sum_in_lanes(std::size_t n, const Function& f) {
+  constexpr std::size_t kWidth = kNativeLanes<T>;
+  using Pack = Lanes<T, kWidth>;
+  using One = Lanes<T, 1>;
+  auto packs = decltype(f(std::size_t{}, Pack())){};
+  constexpr std::size_t kSums = std::tuple_size_v<decltype(packs)>;
+  packs.fill(Pack(0));
+  std::array<T, kSums> sums{};
+  const std::size_t whole = n / kWidth * kWidth;
+  const auto add = [](auto& to, const auto& terms) {
+    for (std::size_t k = 0; k < kSums; ++k) to[k] += terms[k];
+  };
+  for (std::size_t i = 0; i < whole; i += kWidth) add(packs, f(i, Pack()));
+  for (std::size_t i = whole; i < n; ++i) {
+    const auto terms = f(i, One());
+    for (std::size_t k = 0; k < kSums; ++k) {
+      T term;
+      terms[k].store(&term);
+      sums[k] += term;
+    }
+  }
+  for (std::size_t k = 0; k < kSums; ++k) {
+    T lanes[kWidth];
+    packs[k].store(lanes);
+    for (const T lane : lanes) sums[k] += lane;
+  }
+  return sums;
+}
 
 /// out[i] = f(x[i]), f taking Lanes and giving Lanes; x and out may be the same.
 template <class T, class Function>

@@ -12,19 +12,11 @@ GridMajorant::GridMajorant(const Medium& medium, const std::array<int, 3>& resol
       crossing_(crossing),
       lattice_{medium.bounds().lo, medium.bounds().extent().cwiseQuotient(Vec3(resolution[0], resolution[1], resolution[2])),
                resolution},
-      cells_(medium, static_cast<std::size_t>(resolution[0]) * static_cast<std::size_t>(resolution[1]) *
-                         static_cast<std::size_t>(resolution[2])) {
+      cells_(medium, lattice_.cells()) {
   diagonal_ = world_diagonal(medium, lattice_.size);
-  // A point that rounding puts into the neighbouring cell must still be bounded.
-  const Vec3 margin = 1e-9 * lattice_.size;
   const Medium& field = BoundsTable::source(medium);
-  tbb::parallel_for(0, resolution[2], [&](int z) {
-    for (int y = 0; y < resolution[1]; ++y)
-      for (int x = 0; x < resolution[0]; ++x) {
-        const Vec3 lo = lattice_.lo + Vec3(x, y, z).cwiseProduct(lattice_.size);
-        cells_.put(index({x, y, z}), field.extrema({lo - margin, lo + lattice_.size + margin}));
-      }
-  });
+  tbb::parallel_for(std::size_t{0}, cells_.cells(),
+                    [&](std::size_t cell) { cells_.put(cell, field.extrema(lattice_.bounded_box(lattice_.cell(cell)))); });
   for (std::size_t cell = 0; cell < cells_.cells(); ++cell) expect_finite(cells_.largest(cell));
 }
 
@@ -35,7 +27,7 @@ void GridMajorant::start(Walk& walk, const Ray& world, const Ray& local) const {
 
 template <class Visit>
 bool GridMajorant::walk(Walk& walk, const Visit& visit) const {
-  return walk.steps.go_on(lattice_, walk.local, [&](Real end, const std::array<int, 3>& at) { return visit(end, index(at)); });
+  return walk.steps.go_on(lattice_, walk.local, [&](Real end, const std::array<int, 3>& at) { return visit(end, lattice_.index(at)); });
 }
 
 void GridMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& out) const {

@@ -32,11 +32,6 @@ class GridMajorant final : public MajorantStructure {
   Real rate(std::size_t cell) const { return looseness_ * cells_.largest(cell); }
 
  private:
-  std::size_t index(const std::array<int, 3>& at) const {
-    const int cell = (at[2] * lattice_.resolution[1] + at[1]) * lattice_.resolution[0] + at[0];  // of 512^3 at most
-    return static_cast<std::size_t>(cell);
-  }
-
   Real looseness_, diagonal_ = 0;
   Crossing crossing_;
   Lattice lattice_;

@@ -13,6 +13,30 @@ namespace nullmark {
 struct Lattice {
   Vec3 lo = Vec3::Zero(), size = Vec3::Ones();
   std::array<int, 3> resolution{1, 1, 1};
+
+  std::size_t cells() const {
+    std::size_t all = 1;
+    for (const int n : resolution) all *= static_cast<std::size_t>(n);
+    return all;
+  }
+
+  /// x runs fastest.
+  std::size_t index(const std::array<int, 3>& at) const {
+    const auto of = [](int i) { return static_cast<std::size_t>(i); };
+    return (of(at[2]) * of(resolution[1]) + of(at[1])) * of(resolution[0]) + of(at[0]);
+  }
+  std::array<int, 3> cell(std::size_t index) const {
+    const auto x = static_cast<std::size_t>(resolution[0]), y = static_cast<std::size_t>(resolution[1]);
+    return {static_cast<int>(index % x), static_cast<int>(index / x % y), static_cast<int>(index / x / y)};
+  }
+
+  Vec3 corner(const std::array<int, 3>& at) const { return lo + Vec3(at[0], at[1], at[2]).cwiseProduct(size); }
+
+  /// A cell's box, wider by 1e-9 of it: a point that rounding puts into the neighbouring cell must still be bounded.
+  Box bounded_box(const std::array<int, 3>& at) const {
+    const Vec3 margin = 1e-9 * size, low = corner(at);
+    return {low - margin, low + size + margin};
+  }
 };
 
 /// 3D-DDA [Amanatides and Woo 1987]: the cells of a lattice along a ray, from one of its points on.

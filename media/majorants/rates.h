@@ -147,7 +147,7 @@ class Rates {
 
   const RatePiece<Real>& piece(std::size_t i) const {
     if (unfinished_) [[unlikely]]
-      has(i);
+      find_piece(i);
     return known_[i];
   }
 
@@ -155,6 +155,8 @@ class Rates {
     return std::min(piece.end, piece.begin + (depth - piece.depth_before) * piece.inverse_rate);
   }
 
+  // Rarely taken, and kept out of the flights' code.
+  [[gnu::noinline, gnu::cold]] void find_piece(std::size_t i) const { has(i); }
   [[gnu::noinline]] bool find(Real depth) const {
     if (!unfinished_->extend(known_, depth)) unfinished_ = nullptr;
     return depth < known_.total_depth();

@@ -6,19 +6,6 @@
 #include "media/majorants/medium_bounds.h"
 
 namespace nullmark {
-namespace {
-
-/// A point that rounding puts into the neighbouring cell must still be bounded.
-Box widened(const Vec3& lo, const Vec3& size) {
-  const Vec3 margin = 1e-9 * size;
-  return {lo - margin, lo + size + margin};
-}
-
-Vec3 corner(const Lattice& lattice, const std::array<int, 3>& at) {
-  return lattice.lo + Vec3(at[0], at[1], at[2]).cwiseProduct(lattice.size);
-}
-
-}  // namespace
 
 VdbNodesMajorant::VdbNodesMajorant(const Medium& medium, Real looseness, Crossing crossing)
     : looseness_(looseness), crossing_(crossing) {
@@ -26,22 +13,17 @@ VdbNodesMajorant::VdbNodesMajorant(const Medium& medium, Real looseness, Crossin
     throw ParameterError("type", "the medium is no volume and has no nodes; use \"grid\", \"kd_tree\" or \"octree\"");
   const Box box = medium.bounds();
   nodes_.size = Vec3::Constant(kLeaf * kLeaves);
-  std::size_t nodes = 1;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<Eigen::Index>(axis);
     nodes_.lo[k] = std::floor(box.lo[k] / nodes_.size[k]) * nodes_.size[k];
     nodes_.resolution[axis] = std::max(1, static_cast<int>(std::ceil((box.hi[k] - nodes_.lo[k]) / nodes_.size[k])));
-    nodes *= static_cast<std::size_t>(nodes_.resolution[axis]);
   }
   diagonal_ = world_diagonal(medium, Vec3::Constant(kLeaf));
   const Medium& field = BoundsTable::source(medium);
-  const auto place = [&](std::size_t node) {
-    const auto x = static_cast<std::size_t>(nodes_.resolution[0]), y = static_cast<std::size_t>(nodes_.resolution[1]);
-    return std::array{static_cast<int>(node % x), static_cast<int>(node / x % y), static_cast<int>(node / x / y)};
-  };
+  const std::size_t nodes = nodes_.cells();
   first_cell_.assign(nodes, 1);
   tbb::parallel_for(std::size_t{0}, nodes, [&](std::size_t node) {
-    const Real most = field.extrema(widened(corner(nodes_, place(node)), nodes_.size)).maximum.maxCoeff();
+    const Real most = field.extrema(nodes_.bounded_box(nodes_.cell(node))).maximum.maxCoeff();
     if (most == 0) first_cell_[node] = kEmpty;
   });
   std::uint32_t cells = 1;
@@ -54,17 +36,15 @@ VdbNodesMajorant::VdbNodesMajorant(const Medium& medium, Real looseness, Crossin
   cells_.put(kEmpty, field.extrema({box.hi + nodes_.size, box.hi + 2 * nodes_.size}));
   tbb::parallel_for(std::size_t{0}, nodes, [&](std::size_t node) {
     if (first_cell_[node] == kEmpty) return;
-    const Lattice leaves = leaves_of(place(node));
-    std::size_t cell = first_cell_[node];
-    for (int z = 0; z < kLeaves; ++z)
-      for (int y = 0; y < kLeaves; ++y)
-        for (int x = 0; x < kLeaves; ++x) cells_.put(cell++, field.extrema(widened(corner(leaves, {x, y, z}), leaves.size)));
+    const Lattice leaves = leaves_of(nodes_.cell(node));
+    for (std::size_t leaf = 0; leaf < leaves.cells(); ++leaf)
+      cells_.put(first_cell_[node] + leaf, field.extrema(leaves.bounded_box(leaves.cell(leaf))));
   });
   for (std::size_t cell = 0; cell < cells; ++cell) expect_finite(cells_.largest(cell));
 }
 
 Lattice VdbNodesMajorant::leaves_of(const std::array<int, 3>& node) const {
-  return {corner(nodes_, node), Vec3::Constant(kLeaf), {kLeaves, kLeaves, kLeaves}};
+  return {nodes_.corner(node), Vec3::Constant(kLeaf), {kLeaves, kLeaves, kLeaves}};
 }
 
 void VdbNodesMajorant::start(Walk& walk, const Ray& world, const Ray& local) const {
@@ -83,7 +63,7 @@ bool VdbNodesMajorant::walk(Walk& walk, const Visit& visit) const {
   for (;;) {
     Real from = walk.nodes.from();
     const bool goes_on = walk.nodes.go_on(nodes_, walk.local, [&](Real end, const std::array<int, 3>& at) {
-      const std::uint32_t first = first_cell_[index(at)];
+      const std::uint32_t first = first_cell_[nodes_.index(at)];
       if (first == kEmpty) {
         from = end;
         return visit(end, kEmpty);

@@ -39,10 +39,6 @@ class VdbNodesMajorant final : public MajorantStructure {
   static constexpr int kLeaf = 8, kLeaves = 16;  ///< voxels of a leaf, leaves of a node, along each axis
   static constexpr std::size_t kEmpty = 0;       ///< the cell of all nodes without extinction
 
-  std::size_t index(const std::array<int, 3>& at) const {
-    const auto of = [](int i) { return static_cast<std::size_t>(i); };
-    return (of(at[2]) * of(nodes_.resolution[1]) + of(at[1])) * of(nodes_.resolution[0]) + of(at[0]);
-  }
   Lattice leaves_of(const std::array<int, 3>& node) const;
 
   Real looseness_, diagonal_ = 0;
