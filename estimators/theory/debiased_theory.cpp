@@ -45,10 +45,10 @@ Law gauss_rule(const Law& law, Eigen::Index size) {
 
 constexpr int kMostOrder = 28;
 
-/// Coefficients of a polynomial in s, by their power; as many as fill whole registers.
+/// Coefficients of a polynomial in s, by their power; as many as fill whole registers, and a 0.
 constexpr std::size_t kPowers = 32;
 static_assert(kPowers > kMostOrder);
-using Coefficients = std::array<Real, kPowers>;
+using Coefficients = std::array<Real, kPowers + 1>;
 
 /// Weight of the k-th mean of symmetric products of n differences, for all k <= n.
 Coefficients series_weights(int n) {
@@ -83,16 +83,16 @@ class SymmetricMoments {
 
   /// E[sum_k a_k m_k sum_l a_l m_l], m_k over n differences, of weights a: the N others and, where N = n - 1, the pivots' own.
   Real series(const Coefficients& weight, Real first, Real second) const {
-    const auto with = [&](std::size_t k, Real own) { return weight[k] + (k + 1 < kPowers ? own * weight[k + 1] : 0); };
     Coefficients sums{};
     for (std::size_t l = 0; l <= count_; ++l) {
-      const Pack factor(with(l, second));
+      const Pack factor(weight[l] + second * weight[l + 1]);
       for (std::size_t k = 0; k <= count_; k += kWidth)
         (Pack::load(&sums[k]) + factor * Pack::load(power(l) + k)).store(&sums[k]);
     }
-    Real sum = 0;
-    for (std::size_t k = 0; k <= count_; ++k) sum += with(k, first) * sums[k];
-    return sum;
+    return sum_in_lanes<Real>(count_ + 1, [&](std::size_t k, auto pack) {
+      using P = decltype(pack);
+      return std::array{(P::load(&weight[k]) + P(first) * P::load(&weight[k + 1])) * P::load(&sums[k])};
+    })[0];
   }
 
  private:

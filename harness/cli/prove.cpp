@@ -56,12 +56,12 @@ ExitCode run_battery(const ProveCommand& command, const Battery& battery, const 
   context.selected = static_cast<std::size_t>(std::count(battery.selected.begin(), battery.selected.end(), true));
   std::optional<Progress> progress(std::in_place, context.selected, Progress::Lines::none);
   RunObserver observer;
-  observer.cell_done = [&](const CellRecord& record, std::size_t done, std::size_t total) {
-    progress->cell_done(record, done, total);
+  observer.cell_done = [&](const SharedRecord& record, std::size_t done, std::size_t total) {
+    progress->cell_done(*record, done, total);
   };
   observer.progress = [&](const CellRecord& record, double fraction) { progress->cell_progress(record, fraction); };
   observer.timing = [](double) {};
-  observer.cell_timed = [](const CellRecord&) {};
+  observer.cell_timed = [](const SharedRecord&) {};
   observer.verdict_share = observer.statistics_share = [](double) {};
   observer.warning = [&](const std::string& message) { progress->warning(message); };
   return watched_run(battery.plan, battery.selected, {}, options, observer, [&](std::vector<CellRecord> records) {
@@ -106,7 +106,7 @@ ExitCode prove_command(const ProveCommand& command) {
     fmt::print("{}", findings_text(run));
     for (const std::string& one : summary.undecided_trackers) fmt::print("{}\n", one);
     if (!summary.nothing_proven.empty()) fmt::print("{}\n", summary.nothing_proven);
-    if (!command.output.empty()) write_atomically(command.output, results_text(run));
+    if (!command.output.empty()) write_atomically(command.output, [&](const TextSink& to) { write_results(run, to); });
     if (summary.exit == ExitCode::bias_proven || medium_exit != ExitCode::ok) return ExitCode::bias_proven;
     return summary.exit;
   });

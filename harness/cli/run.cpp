@@ -239,14 +239,14 @@ RunOptions options_of(const RunCommand& command, const std::string& output) {
 /// Tells the journal, the progress line and the provenance of what a run does.
 RunObserver observer_of(Journal* journal, Progress& progress, RunContext& context) {
   RunObserver observer;
-  observer.cell_done = [&progress, journal](const CellRecord& record, std::size_t done, std::size_t total) {
-    if (journal && (record.status == Status::ok || record.status == Status::error)) journal->append(record);
-    progress.cell_done(record, done, total);
+  observer.cell_done = [&progress, journal](const SharedRecord& record, std::size_t done, std::size_t total) {
+    if (journal && (record->status == Status::ok || record->status == Status::error)) journal->append(*record);
+    progress.cell_done(*record, done, total);
   };
   observer.progress = [&progress](const CellRecord& record, double fraction) { progress.cell_progress(record, fraction); };
   observer.timing = [&progress](double fraction) { progress.timing(fraction); };
-  observer.cell_timed = [journal](const CellRecord& record) {
-    if (journal) journal->append(record);
+  observer.cell_timed = [journal](const SharedRecord& record) {
+    if (journal) journal->append(*record);
   };
   observer.settled = [journal] {
     if (journal) journal->settle();
@@ -265,16 +265,17 @@ void tell_results(const RunRecord& run, const std::string& output) {
 }
 
 /// To the file, whose journal is done with then, or to standard output where there is no journal.
-ExitCode write_results(const Plan& plan, Earlier cells, const RunContext& context, const std::string& output, Journal* journal) {
+ExitCode conclude_run(const Plan& plan, Earlier cells, const RunContext& context, const std::string& output, Journal* journal) {
   std::vector<CellRecord> records;
-  for (auto& [place, record] : cells) records.push_back(std::move(record));
+  records.reserve(cells.size());
+  while (!cells.empty()) records.push_back(std::move(cells.extract(cells.begin()).mapped()));
   const RunRecord run = make_run_record(plan, std::move(records), context);
   if (journal) {
-    write_atomically(output, results_text(run));
+    write_atomically(output, [&](const TextSink& to) { write_results(run, to); });
     journal->remove();
     tell_results(run, output);
   } else {
-    fmt::print("{}", results_text(run));
+    write_results(run, [](std::string_view part) { fmt::print("{}", part); });
   }
   return outcome(run.cells);
 }
@@ -320,7 +321,8 @@ ExitCode run_command(const RunCommand& command) {
     progress.reset();
     for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i)
       if (selected[i] && next < records.size()) earlier[i] = placed(std::move(records[next++]), plan.cells[i]);
-    return write_results(plan, std::move(earlier), context, output, journal.get());
+    std::vector<CellRecord>().swap(records);
+    return conclude_run(plan, std::move(earlier), context, output, journal.get());
   };
   return watched_run(plan, selected, finished, options, observer_of(journal.get(), *progress, context), conclude);
 }

@@ -25,21 +25,21 @@ using Clock = std::chrono::steady_clock;
 class FinishedCells {
  public:
   explicit FinishedCells(const std::vector<CellRecord>& before) {
-    for (const CellRecord& record : before) cells_[record.cell.name] = record;
+    for (const CellRecord& record : before) cells_[record.cell.name] = std::make_shared<CellRecord>(record);
   }
 
   /// Keeps what the observer is told.
   RunObserver keeping(const RunObserver& observer) {
     RunObserver keeps = observer;
-    keeps.cell_done = [this, &observer](const CellRecord& record, std::size_t done, std::size_t total) {
+    keeps.cell_done = [this, &observer](const SharedRecord& record, std::size_t done, std::size_t total) {
       const std::lock_guard lock(mutex_);
       observer.cell_done(record, done, total);
-      if (record.status != Status::not_run) cells_[record.cell.name] = record;
+      if (record->status != Status::not_run) cells_[record->cell.name] = record;
     };
-    keeps.cell_timed = [this, &observer](const CellRecord& record) {
+    keeps.cell_timed = [this, &observer](const SharedRecord& record) {
       const std::lock_guard lock(mutex_);
       observer.cell_timed(record);
-      cells_[record.cell.name] = record;
+      cells_[record->cell.name] = record;
     };
     keeps.settled = [this, &observer] {
       const std::lock_guard lock(mutex_);
@@ -59,14 +59,17 @@ class FinishedCells {
   }
 
   /// From here on whoever would tell the observer waits.  Nothing where the observer does not return, as on a disk that hangs.
-  const std::map<std::string, CellRecord>* close() {
+  const std::map<std::string, SharedRecord>* close() {
     using namespace std::chrono_literals;
     return mutex_.try_lock_for(300ms) ? &cells_ : nullptr;
   }
 
+  /// Lets go of them, once the run has ended by itself.
+  void forget() { cells_.clear(); }
+
  private:
   std::timed_mutex mutex_;
-  std::map<std::string, CellRecord> cells_;
+  std::map<std::string, SharedRecord> cells_;
 };
 
 std::string what_ended() { return received_signal != 0 ? "signal" : "time budget"; }
@@ -109,9 +112,10 @@ ExitCode watched_run(const Plan& plan, const std::vector<bool>& selected, const 
     ::_exit(static_cast<int>(code));
   };
   Watchdog watchdog(due, leave);
-  std::vector<CellRecord> records = run_plan(plan, selected, finished, options, cells.keeping(observer));
+  std::vector<SharedRecord> records = run_plan(plan, selected, finished, options, cells.keeping(observer));
   watchdog.claim();
-  return conclude(std::move(records));
+  cells.forget();
+  return conclude(unshared(std::move(records)));
 }
 
 }  // namespace nullmark

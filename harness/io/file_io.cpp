@@ -83,7 +83,7 @@ std::string read_file(const std::string& path) {
   return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path) : text;
 }
 
-void write_all(int file, const std::string& text, const std::string& path) {
+void write_all(int file, std::string_view text, const std::string& path) {
   for (std::size_t done = 0; done < text.size();) {
     const ssize_t written = ::write(file, text.data() + done, text.size() - done);
     if (written < 0 && errno == EINTR) continue;
@@ -98,13 +98,25 @@ void make_durable(int file, const std::string& path) {
 }
 
 void write_atomically(const std::string& path, const std::string& text) {
+  write_atomically(path, [&](const TextSink& to) { to(text); });
+}
+
+void write_atomically(const std::string& path, const std::function<void(const TextSink&)>& write) {
   expect_replaceable(path);
   const fs::path target = target_of(path);
   const std::string temporary = fmt::format("{}.{}{}", target.string(), ::getpid(), kTemporary);
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file < 0) fail(path, "written");
   try {
-    write_all(file, text, path);
+    constexpr std::size_t kMostWaiting = std::size_t{1} << 20;
+    std::string waiting;
+    write([&](std::string_view part) {
+      waiting += part;
+      if (waiting.size() < kMostWaiting) return;
+      write_all(file, waiting, path);
+      waiting.clear();
+    });
+    write_all(file, waiting, path);
     make_durable(file, path);
   } catch (...) {
     ::close(file);

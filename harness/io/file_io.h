@@ -1,15 +1,22 @@
 #pragma once
 
+#include <functional>
 #include <string>
+#include <string_view>
 
 namespace nullmark {
 
 /// Reads the whole file, and unpacks gzip.  Throws InputError if it cannot be read, or unpacks to more than 1 GiB.
 std::string read_file(const std::string& path);
 
+/// Takes a text part by part.
+using TextSink = std::function<void(std::string_view)>;
+
 /// Replaces the file atomically: readers see the complete old file or the complete new one, even after a power cut.  Throws
 /// InputError if the path cannot be written.
 void write_atomically(const std::string& path, const std::string& text);
+/// The same of a text that `write` tells part by part, so that it need not be held as a whole.
+void write_atomically(const std::string& path, const std::function<void(const TextSink&)>& write);
 
 /// Throws InputError if the path is a folder, a device or a pipe, which a file would replace.
 void expect_replaceable(const std::string& path);
@@ -18,7 +25,7 @@ void expect_replaceable(const std::string& path);
 void remove_leftovers(const std::string& path);
 
 /// Writes the whole text to an open file, from where a power cut can still lose it.  Throws InputError.
-void write_all(int file, const std::string& text, const std::string& path);
+void write_all(int file, std::string_view text, const std::string& path);
 
 /// Puts on disk what was written to an open file.  Throws InputError.
 void make_durable(int file, const std::string& path);

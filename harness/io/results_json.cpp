@@ -8,20 +8,22 @@
 
 namespace nullmark {
 
-std::string results_text(const RunRecord& run) {
+void write_results(const RunRecord& run, const TextSink& to) {
   Json provenance = Json::object();
   for (const auto& [key, text] : run.provenance) provenance[key] = known_json(text);
-  std::string text = fmt::format("{{\n\"{}\": \"{}\",\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": {},\n", kVersionKey,
+  to(fmt::format("{{\n\"{}\": \"{}\",\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": {},\n", kVersionKey,
                                  RunRecord::kVersion, Json(run.name).dump(), config_hash(run.config_text),
-                                 run.config_text.empty() ? "null" : run.config_text);
-  text += fmt::format("\"provenance\": {},\n\"cells\": [", provenance.dump());
-  for (std::size_t i = 0; i < run.cells.size(); ++i) {
-    text += i == 0 ? "\n" : ",\n";
-    text += cell_json(run.cells[i]).dump();
-  }
-  text += fmt::format("\n],\n\"tables\": {}", tables_json(run.tables).dump());
-  if (!run.claims.empty()) text += fmt::format(",\n\"claims\": {}", claims_json(run.claims).dump());
-  text += "\n}\n";
+                                 run.config_text.empty() ? "null" : run.config_text));
+  to(fmt::format("\"provenance\": {},\n\"cells\": [", provenance.dump()));
+  for (std::size_t i = 0; i < run.cells.size(); ++i) to((i == 0 ? "\n" : ",\n") + cell_json(run.cells[i]).dump());
+  to(fmt::format("\n],\n\"tables\": {}", tables_json(run.tables).dump()));
+  if (!run.claims.empty()) to(fmt::format(",\n\"claims\": {}", claims_json(run.claims).dump()));
+  to("\n}\n");
+}
+
+std::string results_text(const RunRecord& run) {
+  std::string text;
+  write_results(run, [&](std::string_view part) { text += part; });
   return text;
 }
 

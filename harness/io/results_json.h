@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
 #include "harness/model/record.h"
 
@@ -18,6 +19,7 @@ CellRecord read_cell(const JsonNode& node);
 Json cell_schema();
 
 /// The text of a results file, one cell per line.
+void write_results(const RunRecord& run, const TextSink& to);
 std::string results_text(const RunRecord& run);
 
 /// Reads files of the same major schema number; ignores unknown keys.  Throws InputError.

@@ -21,7 +21,7 @@ Summary proven(const std::string& estimator) {
   options.timing = false;
   options.time_budget = 60;
   RunRecord run;
-  run.cells = run_plan(battery.plan, battery.selected, {}, options, {});
+  run.cells = unshared(run_plan(battery.plan, battery.selected, {}, options, {}));
   run.config_text = battery.plan.config_text;
   run.provenance["selected"] = fmt::to_string(run.cells.size());
   return summarise(run);

@@ -34,15 +34,15 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 struct CellOutcome {
-  CellRecord record;
+  std::shared_ptr<CellRecord> record;
   Effort effort;
 };
 
 /// Samples and judges a cell.
 CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& families, const std::function<bool()>& late,
                      const RunOptions& options, const RunObserver& observer, const std::function<bool()>& given_up) {
-  CellOutcome outcome{blank_record(plan, prepared), {}};
-  CellRecord& record = outcome.record;
+  CellOutcome outcome{std::make_shared<CellRecord>(blank_record(plan, prepared)), {}};
+  CellRecord& record = *outcome.record;
   if (!prepared.reason.empty()) {
     record.status = prepared.failure.empty() ? Status::skipped : Status::error;
     record.reason = prepared.reason;
@@ -104,9 +104,9 @@ CellOutcome run_or_fail(const Plan& plan, PreparedCell& prepared, const Families
   const std::string failure = failure_of<InputError, ParameterError, std::bad_alloc>(
       [&] { outcome = run_cell(plan, prepared, families, late, options, observer, given_up); });
   if (failure.empty()) return outcome;
-  outcome = {blank_record(plan, prepared), {}};
-  outcome.record.status = Status::error;
-  outcome.record.reason = failure;
+  outcome = {std::make_shared<CellRecord>(blank_record(plan, prepared)), {}};
+  outcome.record->status = Status::error;
+  outcome.record->reason = failure;
   return outcome;
 }
 
@@ -156,6 +156,9 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
   };
   for_each_in_order(cells.size(), threads, failed, [&](std::size_t i) {
     outcomes[i] = run_or_fail(plan, cells[i], families, late, options, guarded, given_up);
+    // Many cells at once should hold no more than their records.
+    cells[i].targets = {};
+    cells[i].theory = {};
     teller.add([&, i] {
       const std::lock_guard lock(telling);
       observer.cell_done(outcomes[i].record, ++done, cells.size());
@@ -190,7 +193,7 @@ class PhaseClock {
   double cpu_ = cpu_seconds();
 };
 
-using Records = std::map<std::size_t, CellRecord>;  // by place in the plan
+using Records = std::map<std::size_t, SharedRecord>;  // by place in the plan
 
 void time_records(const std::vector<const PreparedCell*>& cells, const TimingPlan& plan, Records& records,
                   const RunObserver& observer, const std::function<bool()>& stop) {
@@ -199,10 +202,12 @@ void time_records(const std::vector<const PreparedCell*>& cells, const TimingPla
   for (const PreparedCell* prepared : cells) timed.push_back({prepared->cell, prepared->scene.get(), prepared->kernel.get()});
   const auto times = time_cells(timed, plan, stop, [&](double fraction) { observer.timing(fraction); });
   for (std::size_t i = 0; i < times.size(); ++i) {
-    CellRecord& record = records[cells[i]->index];
-    record.time = times[i];
     if (!times[i]) continue;
-    record.time->majorant_build_seconds = cells[i]->scene->majorant->build_seconds;
+    SharedRecord& record = records[cells[i]->index];
+    auto timed = std::make_shared<CellRecord>(*record);
+    timed->time = times[i];
+    timed->time->majorant_build_seconds = cells[i]->scene->majorant->build_seconds;
+    record = std::move(timed);
     observer.cell_timed(record);
   }
   observer.settled();
@@ -210,7 +215,8 @@ void time_records(const std::vector<const PreparedCell*>& cells, const TimingPla
 
 /// Throws InputError where a finished cell was sampled in other data than its medium has now.
 void expect_same_media(CellPreparer& preparer, const Plan& plan, const Records& finished) {
-  for (const auto& [index, record] : finished) {
+  for (const auto& [index, shared] : finished) {
+    const CellRecord& record = *shared;
     const std::string now = record.medium_hash.empty() ? "" : preparer.medium_hash(plan.cells[index].medium);
     if (now.empty() || now == record.medium_hash) continue;
     throw InputError(
@@ -222,7 +228,8 @@ void expect_same_media(CellPreparer& preparer, const Plan& plan, const Records& 
 
 /// Throws InputError where a finished cell was sampled with other code of a tracker from outside than there is now.
 void expect_same_trackers(CellPreparer& preparer, const Records& finished) {
-  for (const auto& [index, record] : finished) {
+  for (const auto& [index, shared] : finished) {
+    const CellRecord& record = *shared;
     if (record.tracker.hash.empty()) continue;
     const PreparedCell now = preparer.prepare(index);
     const auto identity = now.source ? now.source->identity() : std::nullopt;
@@ -237,12 +244,12 @@ void expect_same_trackers(CellPreparer& preparer, const Records& finished) {
 }  // namespace
 
 std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selected,
-                                const std::map<std::string, CellRecord>& finished, const std::string& reason) {
+                                const std::map<std::string, SharedRecord>& finished, const std::string& reason) {
   std::vector<CellRecord> records;
   for (std::size_t i = 0; i < plan.cells.size(); ++i) {
     if (!selected[i]) continue;
     if (const auto at = finished.find(plan.cells[i].name); at != finished.end()) {
-      records.push_back(at->second);
+      records.push_back(*at->second);
       continue;
     }
     records.push_back(blank_record(plan, unprepared(plan, i)));
@@ -251,8 +258,21 @@ std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selec
   return records;
 }
 
-std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
-                                 const RunOptions& options, const RunObserver& observer) {
+std::vector<CellRecord> unshared(std::vector<SharedRecord> records) {
+  std::vector<CellRecord> result;
+  result.reserve(records.size());
+  for (SharedRecord& record : records) {
+    if (record.use_count() == 1)
+      result.push_back(std::move(const_cast<CellRecord&>(*record)));
+    else
+      result.push_back(*record);
+    record.reset();
+  }
+  return result;
+}
+
+std::vector<SharedRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
+                                   const RunOptions& options, const RunObserver& observer) {
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(std::max(1, threads)));
   const auto start = Clock::now();
@@ -265,7 +285,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
   Records records;
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
     for (const CellRecord& record : finished)
-      if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = record;
+      if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = std::make_shared<CellRecord>(record);
 
   PhaseClock clock(observer);
   const bool timing = options.timing && plan.timing.enabled;
@@ -279,8 +299,8 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
       preparer, plan,
       [&](std::size_t i) {
         const auto record = records.find(i);
-        return timing && record != records.end() && record->second.status == Status::ok && !record->second.time &&
-               record->second.build.empty();
+        return timing && record != records.end() && record->second->status == Status::ok && !record->second->time &&
+               record->second->build.empty();
       },
       ended);
   clock.end("preparation");
@@ -296,7 +316,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
   Effort effort;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     effort += outcomes[i].effort;
-    if (outcomes[i].record.status == Status::ok) to_time.push_back(&cells[i]);
+    if (outcomes[i].record->status == Status::ok) to_time.push_back(&cells[i]);
     records[cells[i].index] = std::move(outcomes[i].record);
   }
   if (timing && !to_time.empty() && !ended()) {
@@ -307,7 +327,7 @@ std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& sele
     observer.verdict_share(effort.judging / (effort.working - effort.judging));
     observer.statistics_share(effort.statistics / (effort.working - effort.statistics));
   }
-  std::vector<CellRecord> result;
+  std::vector<SharedRecord> result;
   result.reserve(records.size());
   for (auto& [index, record] : records) result.push_back(std::move(record));
   return result;

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,9 @@ struct RunOptions {
   const std::atomic<int>* interrupted = nullptr;  ///< set to a signal's number to stop after the samples under way
 };
 
+/// A record that does not change any more.
+using SharedRecord = std::shared_ptr<const CellRecord>;
+
 /// What a part of a run took: preparation (of media, bounds, rays, references), theory, sampling (with verdicts), timing.
 struct Phase {
   std::string name;
@@ -31,11 +35,11 @@ struct Phase {
 /// Called for every cell when its statistics are done, and again when its time is known.  Cells end in any order.  Calls come one
 /// at a time, from any thread.
 struct RunObserver {
-  std::function<void(const CellRecord&, std::size_t done, std::size_t total)> cell_done = [](const CellRecord&, std::size_t,
-                                                                                             std::size_t) {};
+  std::function<void(const SharedRecord&, std::size_t done, std::size_t total)> cell_done = [](const SharedRecord&, std::size_t,
+                                                                                               std::size_t) {};
   std::function<void(const CellRecord&, double fraction)> progress = [](const CellRecord&, double) {};
   std::function<void(double fraction)> timing = [](double) {};
-  std::function<void(const CellRecord&)> cell_timed = [](const CellRecord&) {};
+  std::function<void(const SharedRecord&)> cell_timed = [](const SharedRecord&) {};
   /// No cell waits that `cell_done` or `cell_timed` has yet to be called for.
   std::function<void()> settled = [] {};
   /// Time of evidence, and of all statistics including evidence, divided by the time of their sampling.
@@ -50,13 +54,16 @@ inline constexpr const char *kInterrupted = "interrupted", *kBudgetSpent = "time
 /// Records in plan order of a run that was cut off: those that are `finished`, by name, and for the others that they were not
 /// run.
 std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selected,
-                                const std::map<std::string, CellRecord>& finished, const std::string& reason);
+                                const std::map<std::string, SharedRecord>& finished, const std::string& reason);
 
 /// Runs the cells for which `selected` is true.  They start in plan order, as many at once as there are threads.  `finished`
 /// holds records that need not run again.  The result holds every selected cell, in plan order.  Throws ParameterError (with a
 /// JSON pointer as `parameter`) for specifications that do not fit their media, and InputError where the data of a medium are not
 /// those that a finished cell was sampled in.
-std::vector<CellRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
-                                 const RunOptions& options, const RunObserver& observer);
+std::vector<SharedRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
+                                   const RunOptions& options, const RunObserver& observer);
+
+/// The records themselves; those that nothing else holds are moved.
+std::vector<CellRecord> unshared(std::vector<SharedRecord> records);
 
 }  // namespace nullmark

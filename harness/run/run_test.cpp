@@ -35,7 +35,7 @@ std::vector<CellRecord> run(const Plan& plan, int threads, const RunObserver& ob
   RunOptions options;
   options.threads = threads;
   options.timing = false;
-  return run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, observer);
+  return unshared(run_plan(plan, std::vector<bool>(plan.cells.size(), true), {}, options, observer));
 }
 
 /// Single precision is skipped where it has no digits for a position or a flight, and what it adds to a mean is no bias.
@@ -126,7 +126,7 @@ TEST(Run, TimesEveryNumberOfSamplesPerTraversal) {
       "experiments":[{"name":"e","rays":"single","samples_per_ray":10,"verdict":{"enabled":false},
       "matrix":{"estimator":"ratio","medium":"linear","majorant":{"type":"grid","resolution":64}}}]})",
                   "test.json");
-  const CellRecord record = run_plan(cells, {true}, {}, {}, {}).at(0);
+  const CellRecord record = *run_plan(cells, {true}, {}, {}, {}).at(0);
   ASSERT_TRUE(record.time);
   EXPECT_EQ(record.time->samples_per_traversal, 64u);
   ASSERT_EQ(record.time->batches.size(), 3u);
@@ -143,9 +143,9 @@ TEST(Run, TellsOfEveryCellOnceAndOneAtATime) {
     RunObserver observer;
     std::vector<std::string> told;
     std::atomic<int> telling = 0;
-    observer.cell_done = [&](const CellRecord& record, std::size_t done, std::size_t total) {
+    observer.cell_done = [&](const SharedRecord& record, std::size_t done, std::size_t total) {
       EXPECT_EQ(++telling, 1);
-      told.push_back(record.cell.id);
+      told.push_back(record->cell.id);
       EXPECT_EQ(done, told.size());
       EXPECT_EQ(total, cells.cells.size());
       --telling;
@@ -173,7 +173,7 @@ TEST(Run, AnObserverThatThrowsEndsIt) {
   const Plan cells = plan();
   RunObserver observer;
   std::size_t told = 0;
-  observer.cell_done = [&](const CellRecord&, std::size_t, std::size_t) {
+  observer.cell_done = [&](const SharedRecord&, std::size_t, std::size_t) {
     if (++told == 3) throw std::runtime_error("disk full");
   };
   EXPECT_THROW(run(cells, 4, observer), std::runtime_error);
@@ -193,7 +193,7 @@ TEST(Run, ACellThatIsCutOffAfterItsSamplesIsNotDone) {
   observer.progress = [&](const CellRecord&, double fraction) {
     if (fraction >= 1) interrupted = SIGINT;
   };
-  const CellRecord record = run_plan(plan, {true}, {}, options, observer).at(0);
+  const CellRecord record = *run_plan(plan, {true}, {}, options, observer).at(0);
   EXPECT_EQ(record.status, Status::not_run);
   EXPECT_EQ(record.reason, kInterrupted);
   EXPECT_FALSE(record.verdict);

@@ -14,7 +14,7 @@ inline std::vector<CellRecord> run_untimed(const Plan& plan, std::vector<bool> s
   RunOptions options;
   options.threads = threads;
   options.timing = false;
-  return run_plan(plan, selected, {}, options, {});
+  return unshared(run_plan(plan, selected, {}, options, {}));
 }
 
 inline std::vector<CellRecord> run_untimed(const Plan& plan, const std::function<bool(const Cell&)>& wanted) {
