@@ -196,10 +196,12 @@ std::optional<Real> telescoping_variance(const RayProfile& profile, int c, Real 
     const std::vector<Real> mu = combs(profile, c, count, nodes->x);
     Real squares = 0, base_mean = 0, march_mean = 0;
     for (std::size_t i = 0; i < nodes->x.size(); ++i) {
-      const Real base = sum_in_lanes<Real>(k, [&](std::size_t j, auto pack) {
-        using Pack = decltype(pack);
-        return std::array{exponential(Pack(-length) * Pack::load(&mu[i * k + j]))};
-      })[0] / count;
+      const Real base = sum_in_lanes<Real>(k,
+                                           [&](std::size_t j, auto pack) {
+                                             using Pack = decltype(pack);
+                                             return std::array{exponential(Pack(-length) * Pack::load(&mu[i * k + j]))};
+                                           })[0] /
+                        count;
       Real even = 0, odd = 0;
       for (std::size_t j = 0; j < k; ++j) (j % 2 == 0 ? even : odd) += mu[i * k + j] * length * 2 / count;
       const Real difference = march_difference(even, odd), error = base - truth + difference / p;

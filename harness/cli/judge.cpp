@@ -51,7 +51,7 @@ ExitCode tell_verdict(const JudgeCommand& command, const Plan& plan, std::vector
   const Summary summary = summarise(run);
   fmt::print("{}", summary_text(run, summary));
   if (summary.exit == ExitCode::inconclusive) fmt::print("{}\n", advice(command, samples));
-  if (!command.output.empty()) write_atomically(command.output, [&](const TextSink& to) { write_results(run, to); });
+  if (!command.output.empty()) write_results(run, command.output);
   return summary.exit;
 }
 

@@ -106,7 +106,7 @@ ExitCode prove_command(const ProveCommand& command) {
     fmt::print("{}", findings_text(run));
     for (const std::string& one : summary.undecided_trackers) fmt::print("{}\n", one);
     if (!summary.nothing_proven.empty()) fmt::print("{}\n", summary.nothing_proven);
-    if (!command.output.empty()) write_atomically(command.output, [&](const TextSink& to) { write_results(run, to); });
+    if (!command.output.empty()) write_results(run, command.output);
     if (summary.exit == ExitCode::bias_proven || medium_exit != ExitCode::ok) return ExitCode::bias_proven;
     return summary.exit;
   });

@@ -271,7 +271,7 @@ ExitCode conclude_run(const Plan& plan, Earlier cells, const RunContext& context
   while (!cells.empty()) records.push_back(std::move(cells.extract(cells.begin()).mapped()));
   const RunRecord run = make_run_record(plan, std::move(records), context);
   if (journal) {
-    write_atomically(output, [&](const TextSink& to) { write_results(run, to); });
+    write_results(run, output);
     journal->remove();
     tell_results(run, output);
   } else {

@@ -112,7 +112,7 @@ ExitCode watched_run(const Plan& plan, const std::vector<bool>& selected, const 
     ::_exit(static_cast<int>(code));
   };
   Watchdog watchdog(due, leave);
-  std::vector<SharedRecord> records = run_plan(plan, selected, finished, options, cells.keeping(observer));
+  std::vector<std::shared_ptr<CellRecord>> records = run_plan(plan, selected, finished, options, cells.keeping(observer));
   watchdog.claim();
   cells.forget();
   return conclude(unshared(std::move(records)));

@@ -20,6 +20,8 @@ Json cell_schema();
 
 /// The text of a results file, one cell per line.
 void write_results(const RunRecord& run, const TextSink& to);
+/// The same to a file, atomically.  Throws InputError if it cannot be written.
+void write_results(const RunRecord& run, const std::string& path);
 std::string results_text(const RunRecord& run);
 
 /// Reads files of the same major schema number; ignores unknown keys.  Throws InputError.

@@ -56,19 +56,30 @@ bool any_floor(const Comparison& comparison) {
                      [](const RankedCell& ranked) { return ranked.cost && ranked.cost->floor; });
 }
 
+bool any_alone(const Comparison& comparison) {
+  return std::any_of(comparison.cells.begin(), comparison.cells.end(),
+                     [](const RankedCell& ranked) { return ranked.cost && ranked.cost->variance_x_ns_alone; });
+}
+
 std::vector<Line> ranking(const Comparison& comparison) {
-  const bool floors = any_floor(comparison);
-  Line heading = {"",         "estimator",  "verdict",   "variance", "variance x lookups", "variance x ns", "alone",
-                  "s to 1 %", "s to 0.1 %", "/ baseline"};
+  const bool floors = any_floor(comparison), alone = any_alone(comparison);
+  Line heading = {"", "estimator", "verdict", "variance", "variance x lookups", "variance x ns"};
+  if (alone) heading.emplace_back("alone");
+  heading.insert(heading.end(), {"s to 1 %", "s to 0.1 %", "/ baseline"});
   if (floors) heading.insert(heading.end(), {"floor", "cheaper than the best unbiased until"});
   std::vector<Line> lines = {heading};
   for (const RankedCell& ranked : comparison.cells) {
     const std::optional<Cost>& cost = ranked.cost;
-    lines.push_back({rank_shown(ranked), ranked.label, standing_of(*ranked.record), cost ? shown(cost->variance) : "-",
-                     cost ? shown(cost->variance_x_lookups) : "-", cost ? shown(cost->variance_x_ns) : "-",
-                     cost ? shown(cost->variance_x_ns_alone) : "-", time_shown(ranked, 0), time_shown(ranked, 1),
-                     shown(ranked.relative)});
-    if (floors) lines.back().insert(lines.back().end(), {floor_shown(ranked), break_even_shown(comparison, ranked)});
+    Line line = {rank_shown(ranked),
+                 ranked.label,
+                 standing_of(*ranked.record),
+                 cost ? shown(cost->variance) : "-",
+                 cost ? shown(cost->variance_x_lookups) : "-",
+                 cost ? shown(cost->variance_x_ns) : "-"};
+    if (alone) line.push_back(cost ? shown(cost->variance_x_ns_alone) : "-");
+    line.insert(line.end(), {time_shown(ranked, 0), time_shown(ranked, 1), shown(ranked.relative)});
+    if (floors) line.insert(line.end(), {floor_shown(ranked), break_even_shown(comparison, ranked)});
+    lines.push_back(std::move(line));
   }
   return lines;
 }

@@ -193,7 +193,7 @@ class PhaseClock {
   double cpu_ = cpu_seconds();
 };
 
-using Records = std::map<std::size_t, SharedRecord>;  // by place in the plan
+using Records = std::map<std::size_t, std::shared_ptr<CellRecord>>;  // by place in the plan
 
 void time_records(const std::vector<const PreparedCell*>& cells, const TimingPlan& plan, Records& records,
                   const RunObserver& observer, const std::function<bool()>& stop) {
@@ -203,11 +203,11 @@ void time_records(const std::vector<const PreparedCell*>& cells, const TimingPla
   const auto times = time_cells(timed, plan, stop, [&](double fraction) { observer.timing(fraction); });
   for (std::size_t i = 0; i < times.size(); ++i) {
     if (!times[i]) continue;
-    SharedRecord& record = records[cells[i]->index];
-    auto timed = std::make_shared<CellRecord>(*record);
-    timed->time = times[i];
-    timed->time->majorant_build_seconds = cells[i]->scene->majorant->build_seconds;
-    record = std::move(timed);
+    // Others keep the record without a time, so the one with it is another.
+    std::shared_ptr<CellRecord>& record = records[cells[i]->index];
+    record = std::make_shared<CellRecord>(*record);
+    record->time = times[i];
+    record->time->majorant_build_seconds = cells[i]->scene->majorant->build_seconds;
     observer.cell_timed(record);
   }
   observer.settled();
@@ -258,12 +258,12 @@ std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selec
   return records;
 }
 
-std::vector<CellRecord> unshared(std::vector<SharedRecord> records) {
+std::vector<CellRecord> unshared(std::vector<std::shared_ptr<CellRecord>> records) {
   std::vector<CellRecord> result;
   result.reserve(records.size());
-  for (SharedRecord& record : records) {
+  for (std::shared_ptr<CellRecord>& record : records) {
     if (record.use_count() == 1)
-      result.push_back(std::move(const_cast<CellRecord&>(*record)));
+      result.push_back(std::move(*record));
     else
       result.push_back(*record);
     record.reset();
@@ -271,8 +271,9 @@ std::vector<CellRecord> unshared(std::vector<SharedRecord> records) {
   return result;
 }
 
-std::vector<SharedRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
-                                   const RunOptions& options, const RunObserver& observer) {
+std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::vector<bool>& selected,
+                                                  const std::vector<CellRecord>& finished, const RunOptions& options,
+                                                  const RunObserver& observer) {
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(std::max(1, threads)));
   const auto start = Clock::now();
@@ -327,7 +328,7 @@ std::vector<SharedRecord> run_plan(const Plan& plan, const std::vector<bool>& se
     observer.verdict_share(effort.judging / (effort.working - effort.judging));
     observer.statistics_share(effort.statistics / (effort.working - effort.statistics));
   }
-  std::vector<SharedRecord> result;
+  std::vector<std::shared_ptr<CellRecord>> result;
   result.reserve(records.size());
   for (auto& [index, record] : records) result.push_back(std::move(record));
   return result;

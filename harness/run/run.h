@@ -23,7 +23,7 @@ struct RunOptions {
   const std::atomic<int>* interrupted = nullptr;  ///< set to a signal's number to stop after the samples under way
 };
 
-/// A record that does not change any more.
+/// A finished record, which others keep as well.
 using SharedRecord = std::shared_ptr<const CellRecord>;
 
 /// What a part of a run took: preparation (of media, bounds, rays, references), theory, sampling (with verdicts), timing.
@@ -60,10 +60,11 @@ std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selec
 /// holds records that need not run again.  The result holds every selected cell, in plan order.  Throws ParameterError (with a
 /// JSON pointer as `parameter`) for specifications that do not fit their media, and InputError where the data of a medium are not
 /// those that a finished cell was sampled in.
-std::vector<SharedRecord> run_plan(const Plan& plan, const std::vector<bool>& selected, const std::vector<CellRecord>& finished,
-                                   const RunOptions& options, const RunObserver& observer);
+std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::vector<bool>& selected,
+                                                  const std::vector<CellRecord>& finished, const RunOptions& options,
+                                                  const RunObserver& observer);
 
 /// The records themselves; those that nothing else holds are moved.
-std::vector<CellRecord> unshared(std::vector<SharedRecord> records);
+std::vector<CellRecord> unshared(std::vector<std::shared_ptr<CellRecord>> records);
 
 }  // namespace nullmark

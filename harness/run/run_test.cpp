@@ -13,6 +13,7 @@
 #include "harness/analysis/hard_case_table.h"
 #include "harness/config/config.h"
 #include "harness/io/results_json.h"
+#include "harness/model/metrics.h"
 #include "harness/report/check_text.h"
 #include "harness/report/comparison_text.h"
 #include "harness/report/data.h"
@@ -135,6 +136,19 @@ TEST(Run, TimesEveryNumberOfSamplesPerTraversal) {
   EXPECT_GT(record.time->batches[0].ns_per_sample, 2 * record.time->ns_per_sample);
   EXPECT_EQ(record.time->repetition_ns.size(), 3u);
   ASSERT_TRUE(record.time->waiting);
+}
+
+TEST(Run, TimesOneSampleAloneUnasked) {
+  const Plan cells = read_config(R"({"nullmark":"config/2","timing":{"repetitions":2,"seconds":0.001},
+      "experiments":[{"name":"e","rays":"single","samples_per_ray":10,"verdict":{"enabled":false},
+      "matrix":{"estimator":"ratio","medium":"linear"}}]})",
+                                 "test.json");
+  const CellRecord record = *run_plan(cells, {true}, {}, {}, {}).at(0);
+  ASSERT_TRUE(record.time);
+  EXPECT_EQ(record.time->samples_per_traversal, 64u);
+  ASSERT_EQ(record.time->batches.size(), 2u);
+  EXPECT_EQ(record.time->batches[0].samples_per_traversal, 1u);
+  EXPECT_EQ(metric(record, "ns_per_sample_alone"), record.time->batches[0].ns_per_sample);
 }
 
 TEST(Run, TellsOfEveryCellOnceAndOneAtATime) {

@@ -10,8 +10,9 @@
 
 namespace nullmark {
 
-/// Runs tasks one after another, in order, on a separate thread, so that waiting for a disk does not delay samples.  Whenever none
-/// waits, it calls `drained`: a disk that keeps tasks waiting is asked once for all of them.  A task that throws is the last.
+/// Runs tasks one after another, in order, on a separate thread, so that waiting for a disk does not delay samples.  Whenever
+/// none waits, it calls `drained`: a disk that keeps tasks waiting is asked once for all of them.  A task that throws is the
+/// last.
 class Background {
  public:
   explicit Background(std::function<void()> drained);

@@ -21,7 +21,8 @@ Real waiting_share(Real wall_seconds, Real thread_seconds);
 
 /// Wall time of every cell's kernel, traversal included, on one thread, with Google Benchmark: repetitions of all cells and of
 /// two calibration loops are interleaved at random, medians and median absolute deviations are taken over them.  One sample alone
-/// is timed whether the plan names it or not.  `progress` is called for each repetition.  Stops between repetitions once `stop` returns true; unfinished cells get no time.
+/// is timed whether the plan names it or not.  `progress` is called for each repetition.  Stops between repetitions once `stop`
+/// returns true; unfinished cells get no time.
 std::vector<std::optional<TimeRecord>> time_cells(const std::vector<TimedCell>& cells, const TimingPlan& plan,
                                                   const std::function<bool()>& stop, const std::function<void(double)>& progress);
 
