@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "harness/foreign/library.h"
 #include "harness/io/json_input.h"
 #include "harness/model/in_flight.h"
 
@@ -55,6 +56,8 @@ void tell_and_crash(int number) {
   line << "nullmark: crashed (signal " << number << ")";
   if (const char* cell = InFlight::cell())
     line << " in cell " << cell << "; `run` keeps the cells that were finished for --resume";
+  if (library_is_loaded())
+    line << "; if a tracker's library is the cause, \"isolate\": true runs it in a process of its own";
   line.write();
   ::signal(number, SIG_DFL);
   ::raise(number);

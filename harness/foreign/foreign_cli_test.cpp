@@ -112,6 +112,7 @@ TEST_F(ForeignProgram, ACrashInsideTheProgramNamesItsCell) {
   configure(library(NULLMARK_TRACKERS_LIBRARY, "ratio", R"("parameters":{"fault":"crashes"})"));
   EXPECT_EQ(run("run c.json -o r.json --allow-foreign"), 128 + SIGSEGV);
   EXPECT_NE(read("err").find("crashed (signal 11) in cell"), std::string::npos) << read("err");
+  EXPECT_NE(read("err").find("\"isolate\": true"), std::string::npos) << read("err");
 }
 
 /// The processes of a session's trackers, by their command lines.

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cfenv>
 #include <cstddef>
 #include <filesystem>
@@ -24,6 +25,8 @@
 
 namespace nullmark {
 namespace {
+
+std::atomic<bool> loaded = false;
 
 /// Rounding, denormals and traps of the thread, which all floating-point code depends on.
 struct FloatingPointMode {
@@ -198,6 +201,8 @@ const nullmark_tracker& find(const std::string& path, GetTracker get, const std:
 
 }  // namespace
 
+bool library_is_loaded() noexcept { return loaded; }
+
 std::shared_ptr<const ForeignTracker> open_library(const std::string& path, const std::string& name,
                                                    const std::string& parameters) {
   if (!std::filesystem::is_regular_file(path))
@@ -205,6 +210,7 @@ std::shared_ptr<const ForeignTracker> open_library(const std::string& path, cons
                          fmt::format("{}: not a file; expected a shared library, its path relative to the configuration", path));
   const std::uint64_t hash = content_hash(path);
   const FloatingPointMode before;
+  loaded = true;
   // A path with a slash is never searched for.  It stays open: its code may have left threads and handlers behind.
   void* const handle = ::dlopen(std::filesystem::absolute(path).c_str(), RTLD_NOW | RTLD_LOCAL);
   // A library linked with -ffast-math sets denormals to zero as it is loaded.

@@ -13,4 +13,7 @@ namespace nullmark {
 std::shared_ptr<const ForeignTracker> open_library(const std::string& path, const std::string& name,
                                                    const std::string& parameters);
 
+/// Whether open_library has loaded any code into this process.  May be called in a handler of signals.
+bool library_is_loaded() noexcept;
+
 }  // namespace nullmark

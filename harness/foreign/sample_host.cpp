@@ -181,15 +181,32 @@ void SampleHost::record(std::uint32_t sample, Real t, std::size_t piece, const d
   throw Stop{};
 }
 
-/// A lookup of a sample at distance t.
-void SampleHost::count(std::uint32_t sample, Real t, const double* values) {
+/// A lookup of a sample at distance t, held to the bound of its piece.
+void SampleHost::audit(std::uint32_t sample, Real t, const double* values) {
   const std::size_t piece = piece_of(sample, t);
   if (workspace_->recording) [[unlikely]]
     record(sample, t, piece, values);
   audit_majorant(channels_ == 1 ? *values : *std::max_element(values, values + channels_), rates_.rate(piece), *counters_);
-  if (++lookups_[sample] < workspace_->most_lookups) return;
-  ++counters_->overruns;
-  throw Stop{};
+}
+
+/// Counts a lookup of each sample.
+void SampleHost::count(std::size_t n, const std::uint32_t* sample) {
+  const std::uint32_t most = workspace_->most_lookups;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (++lookups_[sample[i]] < most) [[likely]]
+      continue;
+    ++counters_->overruns;
+    throw Stop{};
+  }
+}
+
+/// Whether no value exceeds the bound of a ray that has only one.
+bool SampleHost::all_bounded(std::size_t n, const double* values) const {
+  if (rates_.size() > 1) return false;
+  const Real bound = rates_.rate(0);
+  int above = 0;
+  for (std::size_t i = 0; i < n * channels_; ++i) above |= exceeds(values[i], bound);
+  return above == 0;
 }
 
 /// Now and then asks whether to stop.
@@ -218,7 +235,9 @@ void SampleHost::look_up(std::size_t n, const std::uint32_t* sample, const doubl
   for (std::size_t i = 0; i < n; ++i) y[i] = origin.y() + t[i] * direction.y();
   for (std::size_t i = 0; i < n; ++i) z[i] = origin.z() + t[i] * direction.z();
   medium_->extinction({x_.data(), y_.data(), z_.data(), n}, values);
-  for (std::size_t i = 0; i < n; ++i) count(sample[i], t[i], values + i * channels_);
+  if (workspace_->recording || !all_bounded(n, values))
+    for (std::size_t i = 0; i < n; ++i) audit(sample[i], t[i], values + i * channels_);
+  count(n, sample);
   pause(n);
 }
 
@@ -239,8 +258,9 @@ void SampleHost::look_up_at(std::size_t n, const std::uint32_t* sample, const do
   medium_->extinction({x_.data(), y_.data(), z_.data(), n}, values);
   for (std::size_t i = 0; i < n; ++i) {
     if (outside_[i]) std::fill_n(values + i * channels_, channels_, 0.);
-    count(sample[i], distance_of({points[3 * i], points[3 * i + 1], points[3 * i + 2]}), values + i * channels_);
+    audit(sample[i], distance_of({points[3 * i], points[3 * i + 1], points[3 * i + 2]}), values + i * channels_);
   }
+  count(n, sample);
   pause(n);
 }
 

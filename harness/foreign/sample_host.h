@@ -46,7 +46,9 @@ class SampleHost {
   void look_up(std::size_t n, const std::uint32_t* sample, const double* t, double* values);
   void look_up_at(std::size_t n, const std::uint32_t* sample, const double* points, double* values);
   void fly(std::size_t n, const std::uint32_t* sample, double* t, double* rate);
-  void count(std::uint32_t sample, Real t, const double* values);
+  void audit(std::uint32_t sample, Real t, const double* values);
+  void count(std::size_t n, const std::uint32_t* sample);
+  bool all_bounded(std::size_t n, const double* values) const;
   void pause(std::size_t lookups);
   void record(std::uint32_t sample, Real t, std::size_t piece, const double* values);
   std::size_t piece_of(std::uint32_t sample, Real t) const;
