@@ -101,7 +101,7 @@ Value constant_control(const ControlChoice& choice, const MediumRay<Value>& ray,
   if (choice.kind == "average") return average;
   if (choice.kind == "middle") return (low + high) / 2;
   if (choice.kind == "maximum") return high;
-  if (choice.kind == "medium_average") return load<Value>(ray.medium.average.data(), ray.channels);
+  if (choice.kind == "medium_average") return load<Value>(ray.medium->average.data(), ray.channels);
   if (choice.kind == "ray_average") return *ray.exact_depth / ray.length();
   if (choice.kind == "given") return ray.value(choice.value);
   if (choice.kind != "gamma") return low;

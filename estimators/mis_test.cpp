@@ -24,7 +24,7 @@ TEST(UnidirectionalMis, TheoryHasTheValuesOfTheClosedForms) {
   const auto expect = [](const std::shared_ptr<const Medium>& medium, Real looseness, Real variance, Real tolerance) {
     const HandWalked<UnidirectionalMis> hand({}, medium, 1, looseness);
     EXPECT_NEAR(*hand.theory().variance, variance, tolerance);
-    EXPECT_NEAR(*hand.theory().lookups, looseness * hand.ray.medium.maximum[0], 1e-12);
+    EXPECT_NEAR(*hand.theory().lookups, looseness * hand.ray.medium->maximum[0], 1e-12);
   };
   expect(constant(kLog2), 2, .007383, 5e-7);
   expect(rising(), 1, .018306, 5e-7);

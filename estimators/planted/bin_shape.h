@@ -22,7 +22,7 @@ struct PlantedBinShape : DeltaTracking<Value> {
 
   Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
     Event<Value> event = Base::event(walk, ray, at);
-    const Real mu = ray.medium.maximum[0], share = -std::expm1(-mu * ray.length());
+    const Real mu = ray.medium->maximum[0], share = -std::expm1(-mu * ray.length());
     if (event.kind == EventKind::escape || !(share > 0)) return event;
     const Real u = -std::expm1(-mu * (event.distance - ray.begin)) / share * kBins, bin = std::floor(u);
     event.distance = ray.begin - std::log1p(-share * (bin + (u - bin) * (u - bin)) / kBins) / mu;

@@ -26,7 +26,7 @@ struct PlantedDecompositionReset {
   };
 
   void prepare(RayData& ray) const {
-    ray.control = ray.medium.minimum.minCoeff();
+    ray.control = ray.medium->minimum.minCoeff();
     ray.residual.start(ray.begin);
     for (const Segment& segment : ray.bounds.segments())
       ray.residual.append(segment.end, std::max<Real>(0, segment.majorant - ray.control));

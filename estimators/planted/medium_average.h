@@ -18,7 +18,7 @@ struct PlantedMediumAverage : RatioTracking<Value> {
   using Walk = typename RatioTracking<Value>::Walk;
 
   void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
-    const Value average = load<Value>(ray.medium.average.data(), ray.channels);
+    const Value average = load<Value>(ray.medium->average.data(), ray.channels);
     walk.weight *= (at.rate() - (extinction - average)) / at.rate();
   }
 

@@ -19,7 +19,6 @@ class Flight {
     collisions_ = 0;
     depth_ = 0;
     position_ = rates.begin();
-    rates.has(0);
   }
 
   /// Moves to the next tentative collision; false when it lies beyond the ray's end, or where the walk is not `alive`.
@@ -71,6 +70,7 @@ class Flight {
 
   /// Cuts a flight to `depth` at the end of its cell, and others after it, until one ends inside its cell or the ray is left.
   [[gnu::noinline]] bool rewind(Real depth, auto& rng) {
+    rates_->has(0);
     for (;;) {
       while (!(depth_ < rates_->known(piece_).depth_after) && rates_->has(piece_ + 1)) ++piece_;
       if (!(depth_ < rates_->known(piece_).depth_after)) break;

@@ -17,10 +17,10 @@ struct MediumRay {
   int channels = 1;
   Rates majorant;                    ///< one piece per segment, the majorant of the largest channel
   RayBounds bounds;                  ///< extrema per segment
-  Extrema medium;                    ///< over the whole medium
+  const Extrema* medium = nullptr;   ///< over the whole medium
   std::optional<Value> exact_depth;  ///< tau in closed form or by exact traversal; only for estimators with kNeedsOpticalDepth
   std::vector<Real> knots;           ///< sorted, begin and end included; only for estimators with kNeedsKnots
-  std::optional<int> degree;         ///< of the extinction between knots
+  std::optional<int> degree;         ///< of the extinction between knots, with kNeedsKnots
   Vec3 entry = Vec3::Zero();         ///< world point at `begin`
   Value albedo;                      ///< mu_s / mu, in [0, 1]; 0 where nothing scatters
   std::function<Real(Real)>

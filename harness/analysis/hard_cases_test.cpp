@@ -83,6 +83,7 @@ TEST(HardCases, WalksThatDoNotEndAreCounted) {
   PreparedRay context;
   context.local = context.world = Ray{{0, 0.5, 0.5}, Vec3::UnitX(), 0, 1};
   context.bounds.start({{0, 1, 1000, medium->extrema(medium->bounds())}});
+  const Extrema extrema = medium->extrema(medium->bounds());
   for (const auto precision : {Precision::float64, Precision::float32}) {
     const auto kernel = source.kernel(1, precision);
     const BlockKernel<RatioTracking, Real> plain(RatioTracking<Real>(), 1);
@@ -90,7 +91,7 @@ TEST(HardCases, WalksThatDoNotEndAreCounted) {
       for (const std::uint32_t most : {100u, 1u << 30}) {
         const auto workspace = one->workspace();
         workspace->most_lookups = most;
-        one->begin_ray(*workspace, *medium, medium->extrema(medium->bounds()), context);
+        one->begin_ray(*workspace, *medium, extrema, context);
         SampleBlock block;
         Counters counters;
         one->sample(*workspace, *medium, context, 1, 0, 16, Quantity::transmittance, block, counters);

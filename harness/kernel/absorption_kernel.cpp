@@ -79,7 +79,7 @@ class AbsorptionKernel final : public RadianceKernel {
     return state;
   }
 
-  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema& extrema, const PreparedRay& context) const override {
+  void begin_ray(Workspace& workspace, const Medium& medium, const Extrema&, const PreparedRay& context) const override {
     State& state = static_cast<State&>(workspace);
     state.camera = camera_ray(context);
     Sight sight;
@@ -95,7 +95,7 @@ class AbsorptionKernel final : public RadianceKernel {
     mine.exact_depth.reset();
     if (transmittance_->needs_knots()) sorted_knots(medium, mine.local, mine.knots);
     if (transmittance_->needs_optical_depth()) mine.exact_depth = optical_depth(medium, mine.local).depth;
-    transmittance_->begin_ray(*state.inner, medium, extrema, mine);
+    transmittance_->begin_ray(*state.inner, medium, extrema_, mine);
   }
 
   void sample(Workspace& workspace, const Medium& medium, const PreparedRay&, std::uint64_t key, std::uint64_t first,

@@ -125,7 +125,7 @@ class Kernel {
   /// Numbers per sample of a quantity.
   virtual std::size_t outputs(Quantity, const PreparedRay&) const = 0;
 
-  /// Prepares a ray.  Later calls for samples and theory refer to this ray.
+  /// Prepares a ray.  Later calls for samples and theory refer to this ray, the medium and its extrema.
   virtual void begin_ray(Workspace&, const Medium&, const Extrema& medium, const PreparedRay&) const = 0;
 
   /// Draws samples first .. first + count - 1 of the ray.

@@ -16,12 +16,6 @@ struct Sight {
   SurfaceHit hit;
 };
 
-inline Ray moved_to_begin(Ray ray) {
-  ray.origin = ray.at(ray.begin);
-  ray.end -= ray.begin;
-  ray.begin = 0;
-  return ray;
-}
 
 /// Location of the medium.
 struct MediumFrame {
@@ -34,17 +28,27 @@ struct MediumFrame {
     out.hit = hit;
   }
 
-  void look(Ray ray, Sight& out) const {
+  void look(const Ray& ray, Sight& out) const {
     out.hit = {};
-    out.local = clipped(transformed(ray, to_local), bounds);
-    ray.begin = out.local.begin;
-    ray.end = out.local.end;
-    out.world = moved_to_begin(ray);
-    out.local = moved_to_begin(out.local);
+    const Ray local = transformed(ray, to_local);
+    const RayPart part = part_inside(bounds, local);
+    start_at(part, ray, out.world);
+    start_at(part, local, out.local);
   }
 
   Affine to_local;
   Box bounds;
+
+ private:
+  // Number by number: a copy of a whole ray waits until its single numbers are in memory.
+  static void start_at(const RayPart& part, const Ray& ray, Ray& out) {
+    for (int axis = 0; axis < 3; ++axis) {
+      out.origin[axis] = ray.origin[axis] + part.begin * ray.direction[axis];
+      out.direction[axis] = ray.direction[axis];
+    }
+    out.begin = 0;
+    out.end = part.end - part.begin;
+  }
 };
 
 inline Ray camera_ray(const PreparedRay& context) { return {context.world.origin, context.world.direction, 0, kInfinity}; }

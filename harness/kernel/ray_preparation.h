@@ -7,7 +7,7 @@
 namespace nullmark {
 
 /// Fills a tracker's data of a ray, but for what its loop finds in its own way: `bounds`, `exact_depth` and `knots`, which must
-/// be there, and `albedo`, which is set to 0.  `world` and `local` are cut to the medium; `local` must outlive the walks.  Then the
+/// be there, and `albedo`, which is set to 0.  `world` and `local` are cut to the medium; `local` and `extrema` must outlive the walks.  Then the
 /// tracker's `prepare` may follow.
 template <class Traits, class RayData>
 void prepare_ray(RayData& ray, const Medium& medium, const Extrema& extrema, const Ray& world, const Ray& local, int channels) {
@@ -15,9 +15,11 @@ void prepare_ray(RayData& ray, const Medium& medium, const Extrema& extrema, con
   ray.end = world.end;
   ray.entry = world.at(world.begin);
   ray.channels = channels;
-  ray.medium = extrema;
-  ray.degree = medium.polynomial_degree();
+  ray.medium = &extrema;
+  if constexpr (Traits::kNeedsKnots) ray.degree = medium.polynomial_degree();
   ray.bounds.start_rates(ray.begin, ray.majorant);
+  // These may ask for the rate before a flight has found it.
+  if constexpr (Traits::kIgnoresMajorant || Traits::kOwnFlights) ray.majorant.has(0);
   if constexpr (Traits::kNeedsInversion)
     // Two pointers fit std::function's own memory; a ray would be allocated for every leg of a path.
     ray.distance_at_depth = [&medium, along = &local](Real depth) { return distance_at_depth(medium, *along, depth); };

@@ -23,7 +23,7 @@ class HandWalked {
   };
 
   HandWalked(E tracker, std::shared_ptr<const Medium> medium, Real length, Real looseness = 1, int pieces = 1)
-      : estimator(std::move(tracker)), medium_(std::move(medium)) {
+      : estimator(std::move(tracker)), medium_(std::move(medium)), extrema_(medium_->extrema(medium_->bounds())) {
     const Vec3 middle = (medium_->bounds().lo + medium_->bounds().hi) / 2;
     line_ = {{0, middle.y(), middle.z()}, Vec3::UnitX(), 0, length};
     std::vector<Segment> segments;
@@ -35,7 +35,7 @@ class HandWalked {
     ray.bounds.start(std::move(segments));
     if (const auto depth = medium_->optical_depth(line_)) ray.exact_depth = load<Value>(depth->data(), medium_->channels());
     sorted_knots(*medium_, line_, ray.knots);
-    prepare_ray<EstimatorTraits<E, Value>>(ray, *medium_, medium_->extrema(medium_->bounds()), line_, line_, medium_->channels());
+    prepare_ray<EstimatorTraits<E, Value>>(ray, *medium_, extrema_, line_, line_, medium_->channels());
     prepare();
   }
   HandWalked(const HandWalked&) = delete;
@@ -110,6 +110,7 @@ class HandWalked {
   }
 
   std::shared_ptr<const Medium> medium_;
+  Extrema extrema_;
   Ray line_;
 };
 

@@ -50,9 +50,14 @@ inline Ray transformed(const Ray& ray, const Affine& map) {
   return {map * ray.origin, map.linear() * ray.direction, ray.begin, ray.end};
 }
 
-/// Cuts [begin, end] to the part inside the box; an empty interval (begin == end) where the ray misses.  Axis-parallel rays
-/// (components +-0) are inside a slab or miss it; no 0 * infinity can arise.
-inline Ray clipped(Ray ray, const Box& box) {
+/// Distances along a ray.
+struct RayPart {
+  Real begin, end;
+};
+
+/// The part of [ray.begin, ray.end] inside the box; empty (begin == end) where the ray misses.  Axis-parallel rays (components
+/// +-0) are inside a slab or miss it; no 0 * infinity can arise.
+inline RayPart part_inside(const Box& box, const Ray& ray) {
   Real begin = ray.begin, end = ray.end;
   for (int axis = 0; axis < 3; ++axis) {
     const Real o = ray.origin[axis], d = ray.direction[axis];
@@ -64,9 +69,15 @@ inline Ray clipped(Ray ray, const Box& box) {
     begin = std::max(begin, std::min(a, b));
     end = std::min(end, std::max(a, b));
   }
-  ray.begin = begin;
-  ray.end = end;
-  if (!(begin < end)) ray.begin = ray.end = std::isfinite(begin) ? begin : 0;
+  if (!(begin < end)) begin = end = std::isfinite(begin) ? begin : 0;
+  return {begin, end};
+}
+
+/// Cuts a ray to the part inside the box.
+inline Ray clipped(Ray ray, const Box& box) {
+  const RayPart part = part_inside(box, ray);
+  ray.begin = part.begin;
+  ray.end = part.end;
   return ray;
 }
 

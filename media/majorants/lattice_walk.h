@@ -60,26 +60,21 @@ class LatticeWalk {
   /// Calls visit(end, at) for the cells that follow until it returns false (then true) or the walk ends (then false).
   template <class Visit>
   bool go_on(const Lattice& lattice, const Ray& local, const Visit& visit) {
-    // What moves is kept apart: what `visit` writes could be anything else.
-    LatticeWalk walk = *this;
-    bool wanted = true;
-    while (wanted && walk.from_ < walk.end_) {
-      const std::array<int, 3> here = walk.at_;
-      const auto& next = walk.next_;
-      const std::size_t axis = next[0] <= next[1] && next[0] <= next[2] ? 0 : next[1] <= next[2] ? 1 : 2;
+    while (from_ < end_) {
+      const std::array<int, 3> here = at_;
+      const std::size_t axis = next_[0] <= next_[1] && next_[0] <= next_[2] ? 0 : next_[1] <= next_[2] ? 1 : 2;
       const bool upwards = local.direction[static_cast<Eigen::Index>(axis)] > 0;
       const bool leaves = upwards ? here[axis] + 1 >= lattice.resolution[axis] : here[axis] == 0;
-      const Real to = leaves ? walk.end_ : std::min(next[axis], walk.end_);
+      const Real to = leaves ? end_ : std::min(next_[axis], end_);
       if (!leaves) {
-        walk.at_[axis] += upwards ? 1 : -1;
-        walk.next_[axis] = walk.crossing(lattice, local, axis);
+        at_[axis] += upwards ? 1 : -1;
+        next_[axis] = crossing(lattice, local, axis);
       }
-      if (!(to > walk.from_)) continue;
-      walk.from_ = to;
-      wanted = visit(to, here);
+      if (!(to > from_)) continue;
+      from_ = to;
+      if (!visit(to, here)) return true;
     }
-    *this = walk;
-    return !wanted;
+    return false;
   }
 
  private:
