@@ -66,7 +66,7 @@ RayTheories::RayTheories(const Scene& scene, const std::vector<TheoryQuery>& que
     for (const TheoryQuery& query : queries) mine.workspaces.push_back(query.kernel->workspace());
     return mine;
   });
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays(), 8), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays()), [&](const auto& range) {
     Memory& mine = memory.local();
     for (std::size_t ray = range.begin(); ray < range.end(); ++ray) {
       const Medium& medium = *scene.medium->medium;

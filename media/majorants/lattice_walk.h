@@ -51,7 +51,8 @@ class LatticeWalk {
       const auto k = static_cast<Eigen::Index>(axis);
       at_[axis] =
           std::clamp(static_cast<int>(std::floor((start[k] - lattice.lo[k]) / lattice.size[k])), 0, lattice.resolution[axis] - 1);
-      next_[axis] = crossing(lattice, local, axis);
+      next_[axis] = crossing(lattice, local, axis, at_[axis]);
+      after_[axis] = crossing(lattice, local, axis, at_[axis] + step(local, axis));
     }
   }
 
@@ -63,12 +64,13 @@ class LatticeWalk {
     while (from_ < end_) {
       const std::array<int, 3> here = at_;
       const std::size_t axis = next_[0] <= next_[1] && next_[0] <= next_[2] ? 0 : next_[1] <= next_[2] ? 1 : 2;
-      const bool upwards = local.direction[static_cast<Eigen::Index>(axis)] > 0;
-      const bool leaves = upwards ? here[axis] + 1 >= lattice.resolution[axis] : here[axis] == 0;
+      const int onwards = here[axis] + step(local, axis);
+      const bool leaves = onwards < 0 || onwards >= lattice.resolution[axis];
       const Real to = leaves ? end_ : std::min(next_[axis], end_);
       if (!leaves) {
-        at_[axis] += upwards ? 1 : -1;
-        next_[axis] = crossing(lattice, local, axis);
+        at_[axis] = onwards;
+        next_[axis] = after_[axis];
+        after_[axis] = crossing(lattice, local, axis, onwards + step(local, axis));
       }
       if (!(to > from_)) continue;
       from_ = to;
@@ -78,18 +80,21 @@ class LatticeWalk {
   }
 
  private:
-  /// Where the ray leaves the cell along an axis.  From the plane's index, not accumulated, so that it does not drift over many
+  static int step(const Ray& local, std::size_t axis) { return local.direction[static_cast<Eigen::Index>(axis)] > 0 ? 1 : -1; }
+
+  /// Where the ray leaves cell `at` along an axis.  From the plane's index, not accumulated, so that it does not drift over many
   /// cells.
-  Real crossing(const Lattice& lattice, const Ray& local, std::size_t axis) const {
+  static Real crossing(const Lattice& lattice, const Ray& local, std::size_t axis, int at) {
     const auto k = static_cast<Eigen::Index>(axis);
     const Real direction = local.direction[k];
     if (direction == 0) return kInfinity;
-    return (lattice.lo[k] + (at_[axis] + (direction > 0 ? 1 : 0)) * lattice.size[k] - local.origin[k]) / direction;
+    return (lattice.lo[k] + (at + (direction > 0 ? 1 : 0)) * lattice.size[k] - local.origin[k]) / direction;
   }
 
   Real from_ = 0, end_ = 0;
   std::array<int, 3> at_{};
-  std::array<Real, 3> next_{};
+  /// Where the ray leaves its cell along each axis, and the one after it: the next step need not wait for a division.
+  std::array<Real, 3> next_{}, after_{};
 };
 
 }  // namespace nullmark

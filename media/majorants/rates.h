@@ -25,7 +25,8 @@ struct RatePiece {
 class RatePieces {
  public:
   void start(Real begin) {
-    pieces_.assign(1, {begin, begin, 0, kInfinity, 0, 0});
+    pieces_.resize(1);
+    pieces_.front() = {begin, begin, 0, kInfinity, 0, 0};
     empty_ = true;
     total_depth_ = 0;
   }
@@ -146,7 +147,7 @@ class Rates {
   const RatePiece<Real>& known(std::size_t i) const { return known_[i]; }
 
   const RatePiece<Real>& piece(std::size_t i) const {
-    if (unfinished_) [[unlikely]]
+    if (unfinished_ && i >= known_.size()) [[unlikely]]
       find_piece(i);
     return known_[i];
   }
