@@ -370,6 +370,7 @@ ExitCode guarded(int argc, char** argv) {
 int nullmark_main(int argc, char** argv) {
   open_closed_descriptors();
   report_files_that_grow_too_large();
+  return_freed_memory();
   tell_of_crashes();
   if (argc > 0) program_name() = std::filesystem::path(argv[0]).filename().string();
   ExitCode code = guarded(argc, argv);

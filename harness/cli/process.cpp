@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <array>
@@ -71,6 +72,14 @@ void open_closed_descriptors() {
     // The lowest closed descriptor is the one that `open` gives.
     if (::open("/dev/null", file == STDIN_FILENO ? O_WRONLY : O_RDONLY) < 0) return;
   }
+}
+
+void return_freed_memory() {
+#if defined(__GLIBC__)
+  // By themselves these grow with the largest block that was freed.  The memory of cells then lies between the records that stay.
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 16);
+  ::mallopt(M_TRIM_THRESHOLD, 1 << 20);
+#endif
 }
 
 void report_files_that_grow_too_large() { ::signal(SIGXFSZ, SIG_IGN); }

@@ -6,6 +6,9 @@ namespace nullmark {
 /// place and receives what is printed.  Using one of them still fails, as it did when it was closed.
 void open_closed_descriptors();
 
+/// Has freed memory go back to the system early, so that a run of many cells holds little more than their records.
+void return_freed_memory();
+
 /// Has writes beyond the limit on the size of files fail as those to a full disk do, instead of ending the program.
 void report_files_that_grow_too_large();
 
