@@ -11,10 +11,10 @@ namespace nullmark {
 void write_results(const RunRecord& run, const TextSink& to) {
   Json provenance = Json::object();
   for (const auto& [key, text] : run.provenance) provenance[key] = known_json(text);
-  to(fmt::format("{{\n\"{}\": \"{}\",\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": {},\n", kVersionKey,
-                 RunRecord::kVersion, Json(run.name).dump(), config_hash(run.config_text),
-                 run.config_text.empty() ? "null" : run.config_text));
-  to(fmt::format("\"provenance\": {},\n\"cells\": [", provenance.dump()));
+  to(fmt::format("{{\n\"{}\": \"{}\",\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": ", kVersionKey,
+                 RunRecord::kVersion, Json(run.name).dump(), config_hash(run.config_text)));
+  to(run.config_text.empty() ? "null" : run.config_text);
+  to(fmt::format(",\n\"provenance\": {},\n\"cells\": [", provenance.dump()));
   for (std::size_t i = 0; i < run.cells.size(); ++i) to((i == 0 ? "\n" : ",\n") + cell_json(run.cells[i]).dump());
   to(fmt::format("\n],\n\"tables\": {}", tables_json(run.tables).dump()));
   if (!run.claims.empty()) to(fmt::format(",\n\"claims\": {}", claims_json(run.claims).dump()));
