@@ -171,7 +171,7 @@ class EstimatorWalker final : public Walker<Value> {
       ++lookups;
       const Value extinction = load<Value>(state.extinction.data(), path_scene.channels);
       if constexpr (!Traits::kIgnoresMajorant)
-        audit_majorant(largest(extinction), state.ray.majorant.rate(flight.piece()), counters);
+        audit_majorant(largest(extinction), state.ray.majorant.rate_on_the_way(flight.piece()), counters);
       estimator_.consume(state.walk, state.ray, flight, extinction, rng);
       budget.spend();
     }

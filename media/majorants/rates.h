@@ -118,6 +118,8 @@ class Rates {
 
   Real end(std::size_t i) const { return piece(i).end; }
   Real rate(std::size_t i) const { return piece(i).rate; }
+  /// The same, for walks that find their rays' pieces as they go: without a call where piece i is known.
+  Real rate_on_the_way(std::size_t i) const { return i < known_.size() ? known_[i].rate : rate(i); }
   Real depth_before(std::size_t i) const { return piece(i).depth_before; }
   Real depth_after(std::size_t i) const { return piece(i).depth_after; }
 
@@ -147,7 +149,7 @@ class Rates {
   const RatePiece<Real>& known(std::size_t i) const { return known_[i]; }
 
   const RatePiece<Real>& piece(std::size_t i) const {
-    if (unfinished_ && i >= known_.size()) [[unlikely]]
+    if (unfinished_) [[unlikely]]
       find_piece(i);
     return known_[i];
   }
