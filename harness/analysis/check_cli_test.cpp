@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "estimators/planted/scenes.h"
+#include "harness/io/text.h"
 #include "harness/io/verdict_json.h"
 #include "harness/report/junit.h"
 #include "harness/testing/program.h"
@@ -74,7 +75,7 @@ TEST_F(Check, FailsABiasedEstimatorWithWhatRepeatsIt) {
     EXPECT_NE(read("j.xml").find("; biased beyond epsilon, proven (log E "), std::string::npos) << read("j.xml");
     EXPECT_NE(read("m.md").find("| FAIL | " + cell), std::string::npos) << read("m.md");
     const std::string command = reproduction(results("r.json").cells[0], "r.json");
-    EXPECT_NE(read("m.md").find(command), std::string::npos) << command << read("m.md");
+    EXPECT_NE(read("m.md").find(markdown_code(command)), std::string::npos) << command << read("m.md");
     // The command's second half, on the configuration that the file holds.
     write("again.json", Json::parse(read("r.json"))["config"].dump());
     const std::string filter = command.substr(command.find("--filter"));

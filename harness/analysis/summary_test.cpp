@@ -84,7 +84,7 @@ TEST(Summary, JunitAndMarkdownTellEveryEndOfACell) {
   EXPECT_NE(xml.find(R"(jq .config 'it'\''s.json' | nullmark run - -o - --filter '^open$')"), std::string::npos) << xml;
   const std::string markdown = summary_markdown(run, summary, "r.json");
   for (const char* row :
-       {"| FAIL | a<b & \"c\" | mean 0, expected 0: +0; biased, proven (log E 100.0", "| FAIL | costly | lookups differ",
+       {"| FAIL | a&lt;b & \"c\" | mean 0, expected 0: +0; biased, proven (log E 100.0", "| FAIL | costly | lookups differ",
         "| INCONCLUSIVE | open | undecided", "| VIOLATED | violating |", "--filter '^costly$'"})
     EXPECT_NE(markdown.find(row), std::string::npos) << row << "\n" << markdown;
   EXPECT_EQ(markdown.find("good"), std::string::npos);

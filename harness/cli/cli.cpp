@@ -191,8 +191,8 @@ class CommandLine {
       if (!markdown_.empty())
         write_atomically(markdown_, fmt::format("{}{}{}", summary_markdown(run, summary, file_), cases_ ? "\n" : "",
                                                 cases_ ? stability_markdown(run) : ""));
-      if (cases_) fmt::print("{}\n", stability_text(run));
-      fmt::print("{}", summary_text(run, summary));
+      if (cases_) tell("{}\n", stability_text(run));
+      tell("{}", summary_text(run, summary));
       return summary.exit;
     });
     command->add_option("RESULTS", file_, "Results file")->required();
@@ -214,7 +214,7 @@ class CommandLine {
         warn(files_[i], version_remark(runs[i]));
         warn(files_[i], busy_remark(runs[i]));
       }
-      fmt::print("{}", ranking);
+      tell("{}", ranking);
       if (!markdown_.empty()) write_atomically(markdown_, compare_markdown(runs, baseline_, paired_));
       return ExitCode::ok;
     });
@@ -357,6 +357,10 @@ ExitCode guarded(int argc, char** argv) {
     return report(ExitCode::input_error, (error.parameter.empty() ? "" : error.parameter + ": ") + error.what());
   } catch (const std::bad_alloc&) {
     return report(ExitCode::input_error, "not enough memory; use fewer rays, cells or grid cells");
+  } catch (const std::filesystem::filesystem_error& error) {
+    // Of a path that users gave, such as a loop of links.
+    return report(ExitCode::input_error,
+                  fmt::format("{}: {}; give another path", error.path1().string(), error.code().message()));
   } catch (const std::system_error& error) {
     // Of fmt, where the terminal's or the pipe's end is a full disk.
     return report(ExitCode::internal_error, error.what());

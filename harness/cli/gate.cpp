@@ -22,7 +22,7 @@ void write_files(const GateCommand& command, const PerformanceReport& report) {
 
 void deliver(const GateCommand& command, const PerformanceReport& report) {
   write_files(command, report);
-  fmt::print("{}", performance_text(report));
+  tell("{}", performance_text(report));
 }
 
 /// Says what stands in the way, on the terminal and in the files.
@@ -67,7 +67,7 @@ ExitCode update(const GateCommand& command, const Counts& fresh, std::optional<R
   if (const std::filesystem::path parent = std::filesystem::path(file).parent_path(); !parent.empty())
     std::filesystem::create_directories(parent);
   write_atomically(file, text);
-  fmt::print("baseline: {}\n", file);
+  tell("baseline: {}\n", file);
   return ExitCode::ok;
 }
 

@@ -51,6 +51,14 @@ TEST(Hostile, DeepNestingIsRefusedWhereItBegins) {
   EXPECT_NO_THROW(parse_json(repeated("[", 100) + repeated("]", 100), "deep.json"));
 }
 
+/// To the parser a byte of value 0 is the end, and what follows it would go unread.
+TEST(Hostile, NothingHidesBehindAZero) {
+  const std::string whole = config(R"("linear")", R"("samples_per_ray":1)");
+  EXPECT_EQ(error_of(whole), "accepted");
+  EXPECT_EQ(error_of(whole + std::string("\0garbage", 8)),
+            fmt::format("c.json:1:{}: a byte of value 0; expected the text of a JSON file", whole.size() + 1));
+}
+
 TEST(Hostile, SweepsThatMultiplyAreRefused) {
   const std::string thousand = sweep(1000);
   const std::string linear = R"({"type":"linear","begin":)" + thousand + R"(,"end":)" + thousand + "}";
@@ -108,6 +116,36 @@ TEST_F(HostileFiles, RaysAreCountedBeforeTheyAreMade) {
     EXPECT_EQ(error.rfind("nullmark: c.json: /experiments/0/matrix/rays: 268435456 rays", 0), 0u) << error;
     EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << error;
   }
+}
+
+/// Of a sum that no double holds.
+TEST_F(HostileFiles, AMeanThatOverflowsIsAnError) {
+  write("c.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
+    "quantity":"radiance","samples_per_ray":64,"transport":{"environment":1e308},
+    "matrix":{"estimator":"delta","medium":{"type":"linear","albedo":0.5}}}]})");
+  EXPECT_EQ(run("run c.json -o r.json"), static_cast<int>(ExitCode::internal_error));
+  const CellRecord cell = results("r.json").cells.at(0);
+  EXPECT_EQ(cell.status, Status::error);
+  EXPECT_NE(cell.reason.find("beyond the largest number"), std::string::npos) << cell.reason;
+}
+
+/// Names come from strangers; a terminal must not obey them.
+TEST_F(HostileFiles, NamesDoNotReachTheTerminalAsCommands) {
+  const std::string name = R"(\u001b]0;owned\u0007|<script>)";
+  write("c.json", R"({"nullmark":"config/2","timing":{"enabled":false},"name":")" + name + R"(","experiments":[{"name":")" +
+                      name +
+                      R"(","rays":"single","samples_per_ray":64,"matrix":{"estimator":["ratio","delta"],"medium":"linear"}}]})");
+  for (const char* command : {"run c.json -o r.json --force", "check r.json --markdown m.md", "compare r.json",
+                              "run c.json --dry-run", "replay r.json nothing", "run c.json --filter '(\x1b'"}) {
+    run(command);
+    for (const char* stream : {"out", "err"}) {
+      const std::string text = read(stream);
+      EXPECT_EQ(text.find_first_of("\x1b\x07"), std::string::npos) << command << ": " << text;
+    }
+  }
+  const std::string summary = read("m.md");
+  EXPECT_EQ(summary.find("<script"), std::string::npos) << summary;
+  EXPECT_EQ(summary.find('\x1b'), std::string::npos) << summary;
 }
 
 TEST_F(HostileFiles, LinksToResultsStayLinks) {

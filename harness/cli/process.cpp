@@ -57,8 +57,7 @@ void tell_and_crash(int number) {
   line << "nullmark: crashed (signal " << number << ")";
   if (const char* cell = InFlight::cell())
     line << " in cell " << cell << "; `run` keeps the cells that were finished for --resume";
-  if (library_is_loaded())
-    line << "; if a tracker's library is the cause, \"isolate\": true runs it in a process of its own";
+  if (library_is_loaded()) line << "; if a tracker's library is the cause, \"isolate\": true runs it in a process of its own";
   line.write();
   ::signal(number, SIG_DFL);
   ::raise(number);

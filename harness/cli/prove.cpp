@@ -13,6 +13,7 @@
 #include "harness/foreign/consent.h"
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
+#include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
 #include "harness/registry/components.h"
@@ -93,7 +94,7 @@ ExitCode prove_command(const ProveCommand& command) {
   ExitCode medium_exit = ExitCode::ok;
   if (!command.medium.empty()) {
     medium_exit = prove_medium_alone(command, text);
-    fmt::print("medium {}\n{}\n", command.medium, text);
+    tell("medium {}\n{}\n", command.medium, text);
   }
   const std::string estimator = command.estimator.empty() ? "ratio" : command.estimator;
   const Battery battery = make_battery(component_argument(estimator),
@@ -101,11 +102,11 @@ ExitCode prove_command(const ProveCommand& command) {
   catch_signals();
   return run_battery(command, battery, [&](RunRecord run) {
     const Summary summary = summarise(run);
-    fmt::print("estimator {}\n{}{}", estimator, members_text(battery.plan.cells[0].estimator.type), scenes_text(run));
-    for (const std::string& one : battery.left_out) fmt::print("not tried: {}\n", one);
-    fmt::print("{}", findings_text(run));
-    for (const std::string& one : summary.undecided_trackers) fmt::print("{}\n", one);
-    if (!summary.nothing_proven.empty()) fmt::print("{}\n", summary.nothing_proven);
+    tell("estimator {}\n{}{}", estimator, members_text(battery.plan.cells[0].estimator.type), scenes_text(run));
+    for (const std::string& one : battery.left_out) tell("not tried: {}\n", one);
+    tell("{}", findings_text(run));
+    for (const std::string& one : summary.undecided_trackers) tell("{}\n", one);
+    if (!summary.nothing_proven.empty()) tell("{}\n", summary.nothing_proven);
     if (!command.output.empty()) write_results(run, command.output);
     if (summary.exit == ExitCode::bias_proven || medium_exit != ExitCode::ok) return ExitCode::bias_proven;
     return summary.exit;

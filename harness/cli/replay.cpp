@@ -8,6 +8,7 @@
 #include "harness/cli/process.h"
 #include "harness/foreign/consent.h"
 #include "harness/io/file_io.h"
+#include "harness/io/notice.h"
 #include "harness/io/results_json.h"
 
 namespace nullmark {
@@ -34,7 +35,7 @@ ExitCode replay_command(const ReplayCommand& command) {
   if (command.json)
     fmt::print("{}\n", replay_json(replay).dump(2));
   else
-    fmt::print("{}", replay_text(replay));
+    tell("{}", replay_text(replay));
   return ExitCode::ok;
 }
 

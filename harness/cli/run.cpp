@@ -145,7 +145,7 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
       lookups_to_decide += lookups.value_or(0);
     all_known &= lookups.has_value();
   }
-  fmt::print(
+  tell(
       "{}\n{} cells, {:.4g} samples, {}{:.4g} lookups, about {:.3g} s of one core at {} ns per lookup, without timing; about "
       "{:.4g} lookups including further samples of verdicts\n",
       aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
@@ -196,7 +196,9 @@ void warn_of_own_seeds(const Plan& plan, std::uint64_t seed) {
 std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vector<ConfigSource>& sources, const Plan& plan,
                                       const std::string& output) {
   refuse_overwriting(inputs_of(sources, plan), {output, Journal::path_for(output)});
-  if (std::filesystem::is_directory(output)) throw InputError(output + ": is a folder; expected the path of a results file");
+  if (std::error_code error; std::filesystem::is_directory(output, error))
+    throw InputError(output + ": is a folder; expected the path of a results file");
+  expect_replaceable(output);
   using Mode = Journal::Mode;
   auto journal = std::make_unique<Journal>(output, config_hash(plan.config_text),
                                            command.resume  ? Mode::resume
@@ -259,7 +261,7 @@ RunObserver observer_of(Journal* journal, Progress& progress, RunContext& contex
 }
 
 void tell_results(const RunRecord& run, const std::string& output) {
-  fmt::print("{}", results_tables(run));
+  tell("{}", results_tables(run));
   notice("results: {}\n", output);
   if (const auto remark = busy_remark(run)) notice("nullmark: warning: {}\n", *remark);
 }

@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <iostream>
-#include <iterator>
 #include <map>
 #include <set>
 
@@ -17,6 +15,7 @@
 #include "harness/config/component_reader.h"
 #include "harness/config/experiment.h"
 #include "harness/io/claims_json.h"
+#include "harness/io/file_io.h"
 #include "harness/io/spec_fields.h"
 #include "harness/io/spec_json.h"
 #include "harness/io/tables_json.h"
@@ -201,17 +200,11 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
 
 std::vector<ConfigSource> load_configs(const std::vector<std::string>& paths) {
   namespace fs = std::filesystem;
-  const auto all = [](std::istream& in) { return std::string(std::istreambuf_iterator<char>(in), {}); };
   std::vector<ConfigSource> sources;
-  const auto load = [&](const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    if (!in)
-      throw InputError(path.string() + (fs::exists(path) ? ": cannot be read; expected a configuration file" : ": no such file"));
-    sources.push_back({all(in), path.string()});
-  };
+  const auto load = [&](const fs::path& path) { sources.push_back({read_file(path.string()), path.string()}); };
   for (const std::string& path : paths) {
     if (path == "-") {
-      sources.push_back({all(std::cin), "<stdin>"});
+      sources.push_back({read_stream(std::cin, "<stdin>"), "<stdin>"});
     } else if (fs::is_directory(path)) {
       std::vector<fs::path> files;
       for (const auto& entry : fs::directory_iterator(path))

@@ -47,30 +47,58 @@ void sync_directory(const fs::path& directory) {
   ::close(file);
 }
 
-std::string unpacked(const std::string& packed, const std::string& path) {
-  constexpr std::size_t kMost = std::size_t{1} << 30;
+/// The largest text that is read, packed or not.
+constexpr std::size_t kLargestText = std::size_t{1} << 30;
+
+/// Calls visit(part) for all of a packed text.
+template <class Visit>
+void unpack(const std::string& packed, const std::string& path, const Visit& visit) {
   namespace io = boost::iostreams;
   io::filtering_istream stream;
   stream.push(io::gzip_decompressor());
   stream.push(io::array_source(packed.data(), packed.size()));
   // Otherwise what is damaged would only look shorter.
   stream.exceptions(std::ios::badbit);
-  std::string text;
   std::vector<char> part(std::size_t{1} << 20);
   try {
-    while (stream.read(part.data(), static_cast<std::streamsize>(part.size())) || stream.gcount() > 0) {
-      text.append(part.data(), static_cast<std::size_t>(stream.gcount()));
-      if (text.size() > kMost) throw InputError(path + ": unpacks to more than 1 GiB; expected results of nullmark");
-    }
+    while (stream.read(part.data(), static_cast<std::streamsize>(part.size())) || stream.gcount() > 0)
+      visit(std::string_view(part.data(), static_cast<std::size_t>(stream.gcount())));
   } catch (const io::gzip_error&) {
     throw InputError(path + ": is a damaged gzip file; copy it again");
   } catch (const std::ios_base::failure&) {
     throw InputError(path + ": is a damaged gzip file; copy it again");
   }
+}
+
+std::string unpacked(const std::string& packed, const std::string& path) {
+  // Its size first: a small file may unpack to more than the machine's memory.
+  std::size_t size = 0;
+  unpack(packed, path, [&](std::string_view part) {
+    size += part.size();
+    if (size > kLargestText) throw InputError(path + ": unpacks to more than 1 GiB; expected results of nullmark");
+  });
+  std::string text;
+  text.reserve(size);
+  unpack(packed, path, [&](std::string_view part) { text += part; });
   return text;
 }
 
 }  // namespace
+
+std::string read_stream(std::istream& in, const std::string& path) {
+  // Some devices never end.
+  constexpr std::size_t kMostOfDevice = std::size_t{1} << 24;
+  std::error_code error;
+  const bool device = fs::is_character_file(path, error);
+  std::string text;
+  std::vector<char> part(std::size_t{1} << 20);
+  while (in.read(part.data(), static_cast<std::streamsize>(part.size())) || in.gcount() > 0) {
+    text.append(part.data(), static_cast<std::size_t>(in.gcount()));
+    if (device && text.size() > kMostOfDevice) throw InputError(path + ": does not end; expected a file");
+    if (text.size() > kLargestText) throw InputError(path + ": holds more than 1 GiB; expected a configuration or results");
+  }
+  return text;
+}
 
 std::string read_file(const std::string& path) {
   std::error_code error;
@@ -79,7 +107,7 @@ std::string read_file(const std::string& path) {
   if (const int reason = errno; !in)
     throw InputError(reason == ENOENT ? path + ": no such file"
                                       : fmt::format("{}: cannot be read: {}; expected a file", path, std::strerror(reason)));
-  std::string text{std::istreambuf_iterator<char>(in), {}};
+  std::string text = read_stream(in, path);
   return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path) : text;
 }
 
@@ -134,6 +162,8 @@ void write_atomically(const std::string& path, const std::function<void(const Te
 void expect_replaceable(const std::string& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
+  if (status.type() == fs::file_type::none)
+    throw InputError(fmt::format("{}: cannot be written: {}; give another path", path, error.message()));
   if (fs::exists(status) && !fs::is_regular_file(status))
     throw InputError(path + ": is not a regular file; expected the path of a file, or - for standard output");
 }

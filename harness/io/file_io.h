@@ -1,12 +1,16 @@
 #pragma once
 
 #include <functional>
+#include <istream>
 #include <string>
 #include <string_view>
 
 namespace nullmark {
 
-/// Reads the whole file, and unpacks gzip.  Throws InputError if it cannot be read, or unpacks to more than 1 GiB.
+/// What is left of a stream; `path` names it.  Throws InputError beyond 1 GiB, and of a device beyond 16 MiB.
+std::string read_stream(std::istream& in, const std::string& path);
+
+/// Reads the whole file, and unpacks gzip.  Throws InputError if it cannot be read, or holds or unpacks to more than 1 GiB.
 std::string read_file(const std::string& path);
 
 /// Takes a text part by part.

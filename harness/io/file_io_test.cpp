@@ -44,6 +44,28 @@ TEST_F(FileIo, DamagedPacksAreErrors) {
   EXPECT_THROW(read("turned.gz"), InputError);
 }
 
+/// Devices that never end, and what is nothing but a loop of links.
+TEST_F(FileIo, WhatIsNoFileIsToldInOneLine) {
+  const auto error_of = [](const std::string& path) {
+    try {
+      read_file(path);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("read");
+  };
+  EXPECT_EQ(error_of("/dev/zero"), "/dev/zero: does not end; expected a file");
+  const std::string loop = (folder_ / "loop").string();
+  std::filesystem::create_symlink("loop", loop);
+  EXPECT_EQ(error_of(loop), loop + ": cannot be read: Too many levels of symbolic links; expected a file");
+  try {
+    expect_replaceable(loop);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()), loop + ": cannot be written: Too many levels of symbolic links; give another path");
+  }
+}
+
 TEST_F(FileIo, PacksThatGrowBeyondAllMemoryAreRefused) {
   write("bomb.gz", packed(std::string((std::size_t{1} << 30) + 1, ' ')));
   EXPECT_THROW(read("bomb.gz"), InputError);

@@ -104,6 +104,9 @@ std::string escaped(std::string key) {
 }  // namespace
 
 Json parse_json(const std::string& text, const std::string& file) {
+  // To the parser it is the end of the text.
+  if (const std::size_t zero = text.find('\0'); zero != std::string::npos)
+    throw InputError(position(file, text, zero) + ": a byte of value 0; expected the text of a JSON file");
   const char* const begin = text.data();
   const char* seen = begin;
   const auto offset = [&] { return static_cast<std::size_t>(seen - begin); };

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <set>
+
 #include "harness/io/claims_json.h"
 #include "harness/io/spec_json.h"
 #include "harness/io/tables_json.h"
@@ -11,8 +14,8 @@ namespace nullmark {
 void write_results(const RunRecord& run, const TextSink& to) {
   Json provenance = Json::object();
   for (const auto& [key, text] : run.provenance) provenance[key] = known_json(text);
-  to(fmt::format("{{\n\"{}\": \"{}\",\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": ", kVersionKey,
-                 RunRecord::kVersion, Json(run.name).dump(), config_hash(run.config_text)));
+  to(fmt::format("{{\n\"{}\": \"{}\",\n\"name\": {},\n\"config_hash\": \"{}\",\n\"config\": ", kVersionKey, RunRecord::kVersion,
+                 Json(run.name).dump(), config_hash(run.config_text)));
   to(run.config_text.empty() ? "null" : run.config_text);
   to(fmt::format(",\n\"provenance\": {},\n\"cells\": [", provenance.dump()));
   for (std::size_t i = 0; i < run.cells.size(); ++i) to((i == 0 ? "\n" : ",\n") + cell_json(run.cells[i]).dump());
@@ -45,6 +48,31 @@ std::string statistics_text(const RunRecord& run) {
   return text;
 }
 
+namespace {
+
+/// Throws InputError where the numbers of a cell contradict each other, as in a file that was changed by hand.
+void expect_consistent(const CellRecord& record, const JsonNode& cell) {
+  constexpr const char* kChanged = "the file was changed, or is damaged: make the results again";
+  if (record.status != Status::ok) return;
+  // Of pictures a sample is the mean of a group of rays.
+  const std::uint64_t each = record.cell.samples_per_ray, drawn = each == 0 ? 0 : record.samples / each;
+  if (drawn < 1 || drawn > record.rays || record.samples % each != 0)
+    cell["samples"].fail(
+        fmt::format("found {} samples of {} rays with {} each; {}", record.samples, record.rays, each, kChanged));
+  // Of a difference that was computed before its terms were rounded to text.
+  constexpr Real kRounding = 1e-9;
+  for (const ChannelRecord& channel : record.channel) {
+    if (!channel.mean || !channel.reference || !channel.bias) continue;
+    if (std::abs(*channel.mean - *channel.reference - *channel.bias) <=
+        kRounding * (std::abs(*channel.mean) + std::abs(*channel.reference)))
+      continue;
+    cell["bias"].fail(fmt::format("found bias {:.6g}, and {:.6g} as the mean less the reference; {}", *channel.bias,
+                                  *channel.mean - *channel.reference, kChanged));
+  }
+}
+
+}  // namespace
+
 RunRecord read_results(const std::string& text, const std::string& file) {
   const auto no_results = [&] { return InputError(file + ": is not a results file of nullmark; `nullmark run` writes them"); };
   const std::size_t first = text.find_first_not_of(" \t\r\n");
@@ -63,7 +91,14 @@ RunRecord read_results(const std::string& text, const std::string& file) {
   if (!top["config"].json().is_null()) run.config_text = top["config"].json().dump();
   top["provenance"].expect_object();
   for (const auto& [key, value] : top["provenance"].json().items()) run.provenance[key] = value.dump();
-  for (const JsonNode& cell : top["cells"].elements()) run.cells.push_back(read_cell(cell));
+  std::set<std::pair<std::string, std::string>> seen;
+  for (const JsonNode& cell : top["cells"].elements()) {
+    run.cells.push_back(read_cell(cell));
+    const CellRecord& record = run.cells.back();
+    expect_consistent(record, cell);
+    if (!seen.emplace(record.cell.id, record.cell.name).second)
+      cell.fail(fmt::format("found \"{}\" a second time; expected each cell once", record.cell.name));
+  }
   if (top.has("tables")) run.tables = read_tables(top["tables"], CellReader());
   if (top.has("claims")) read_claims(top["claims"], CellReader(), run.claims);
   return run;

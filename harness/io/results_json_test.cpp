@@ -140,6 +140,26 @@ TEST(ResultsJson, ErrorsAreOneLine) {
   EXPECT_EQ(error_of(replaced(text, "\"status\":\"ok\"", "\"new\":1,\"status\":\"ok\"")), "no error");
 }
 
+/// Numbers of a cell that contradict each other.
+TEST(ResultsJson, EditedFilesDoNotFitThemselves) {
+  const RunRecord run = example_results();
+  ASSERT_EQ(error_of(results_text(run)), "no error");
+  const auto error_with = [&](const auto& edit) {
+    RunRecord edited = run;
+    edit(edited.cells[0]);
+    return error_of(results_text(edited));
+  };
+  EXPECT_NE(error_with([](CellRecord& cell) { *cell.channel[0].bias += 1e-3; }).find("r.json: /cells/0/bias: found bias "),
+            std::string::npos);
+  EXPECT_NE(error_with([](CellRecord& cell) { *cell.channel[0].mean += 1e-3; }).find("r.json: /cells/0/bias: found bias "),
+            std::string::npos);
+  EXPECT_NE(error_with([](CellRecord& cell) { cell.samples = 1'000'000'000'000'000; }).find("r.json: /cells/0/samples: found "),
+            std::string::npos);
+  RunRecord twice = run;
+  twice.cells.push_back(twice.cells[0]);
+  EXPECT_NE(error_of(results_text(twice)).find("a second time; expected each cell once"), std::string::npos);
+}
+
 TEST(ResultsJson, FilesAreReplacedAtOnce) {
   const std::string path = ::testing::TempDir() + "nullmark_atomic.json";
   write_atomically(path, "old");

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "media/base/types.h"
@@ -12,14 +13,22 @@ namespace nullmark {
 /// one are left-aligned, the others right-aligned.
 std::string aligned(const std::vector<std::vector<std::string>>& lines, std::size_t left);
 
-/// The same as a markdown table; escaped text for one of its cells.
+/// The same as a markdown table.
 std::string markdown_table(const std::vector<std::vector<std::string>>& lines);
+
+/// Text for a cell of a markdown table, or for a line: no cell ends in it and no HTML begins.
 std::string markdown_cell(const std::string& text);
+
+/// The same as code that can be copied.
+std::string markdown_code(const std::string& text);
+
+/// Text for people: control characters other than line breaks and tabs, which a terminal would obey, are shown as \x1b.
+std::string plain_text(std::string_view text);
 
 /// Four significant digits, or "-" if there is no number.
 std::string short_number(const std::optional<Real>& number);
 
-/// Text escaped for XML, including attributes.
+/// Text escaped for XML, including attributes.  What XML cannot hold is replaced.
 std::string xml(const std::string& text);
 
 /// Text quoted as one word of a shell command.

@@ -74,9 +74,10 @@ class GivenSamplesKernel final : public Kernel {
     const std::uint64_t from = of_pilot ? first - first_sample::kPilot : first, most = of_pilot ? split_.pilot : split_.judged;
     // A sample that is used twice would count as two.
     if (from > most || count > most - from)
-      throw std::runtime_error(fmt::format("found {} samples of each ray to judge, after {} of the pilot; {} are asked for: expected "
-                                           "\"samples_per_ray\" of at most {} and a \"verdict\" of \"max_samples_per_ray\" {}",
-                                           split_.judged, split_.pilot, from + count, split_.judged, split_.judged));
+      throw std::runtime_error(
+          fmt::format("found {} samples of each ray to judge, after {} of the pilot; {} are asked for: expected "
+                      "\"samples_per_ray\" of at most {} and a \"verdict\" of \"max_samples_per_ray\" {}",
+                      split_.judged, split_.pilot, from + count, split_.judged, split_.judged));
     out.values.resize(count * samples_->channels());
     out.lookups.assign(count, 0);
     counters.samples += count;

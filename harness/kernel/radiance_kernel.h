@@ -16,7 +16,6 @@ struct Sight {
   SurfaceHit hit;
 };
 
-
 /// Location of the medium.
 struct MediumFrame {
   explicit MediumFrame(const Medium& medium) : to_local(medium.world_to_local()), bounds(medium.bounds()) {}

@@ -7,8 +7,8 @@
 namespace nullmark {
 
 /// Fills a tracker's data of a ray, but for what its loop finds in its own way: `bounds`, `exact_depth` and `knots`, which must
-/// be there, and `albedo`, which is set to 0.  `world` and `local` are cut to the medium; `local` and `extrema` must outlive the walks.  Then the
-/// tracker's `prepare` may follow.
+/// be there, and `albedo`, which is set to 0.  `world` and `local` are cut to the medium; `local` and `extrema` must outlive the
+/// walks.  Then the tracker's `prepare` may follow.
 template <class Traits, class RayData>
 void prepare_ray(RayData& ray, const Medium& medium, const Extrema& extrema, const Ray& world, const Ray& local, int channels) {
   ray.begin = world.begin;

@@ -107,7 +107,7 @@ std::string summary_text(const RunRecord& run, const Summary& summary) {
 }
 
 std::string summary_markdown(const RunRecord& run, const Summary& summary, const std::string& file) {
-  std::string text = fmt::format("### nullmark check: {}\n\n{}; {}.\n", run.name, counts(run, summary), families(run));
+  std::string text = fmt::format("### nullmark check: {}\n\n{}; {}.\n", markdown_cell(run.name), counts(run, summary), families(run));
   for (const std::string& line : remarks_of(run, summary)) text += fmt::format("- {}\n", markdown_cell(line));
   const auto table = [&](std::initializer_list<Kind> kinds, const std::string& title, bool commands) {
     std::string rows;
@@ -117,7 +117,7 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
           (kind_of(record) != Kind::pass || !marks_of(record).empty())) {
         rows += fmt::format("| {} | {} | {} |\n", marked_word(record), markdown_cell(record.cell.name),
                             markdown_cell(finding_of(record)));
-        if (commands) rows += fmt::format("| | | `{}` |\n", reproduction(record, file));
+        if (commands) rows += fmt::format("| | | {} |\n", markdown_code(reproduction(record, file)));
         ++count;
       }
     if (count > 0)
@@ -133,7 +133,7 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
   if (!summary.findings.empty()) text += fmt::format("\n{}", findings_markdown(summary.findings));
   if (!summary.orders.empty()) {
     text += "\n| convergence order |\n|---|\n";
-    for (const OrderFit& fit : summary.orders) text += fmt::format("| {} |\n", order_line(fit));
+    for (const OrderFit& fit : summary.orders) text += fmt::format("| {} |\n", markdown_cell(order_line(fit)));
   }
   return text;
 }

@@ -77,7 +77,9 @@ LayeredImage read_exr(const std::string& path) {
   LayeredImage image{static_cast<int>(width), static_cast<int>(height), {}};
   for (auto channel = file.header().channels().begin(); channel != file.header().channels().end(); ++channel) {
     if (channel.channel().type != Imf::FLOAT || channel.channel().xSampling != 1 || channel.channel().ySampling != 1)
-      throw std::runtime_error(path + ": channels are not 32-bit floats, one a pixel; write the image again as floats, because rounding to halves is a bias");
+      throw std::runtime_error(
+          path +
+          ": channels are not 32-bit floats, one a pixel; write the image again as floats, because rounding to halves is a bias");
     image.layers.push_back({channel.name(), {}});
   }
   const auto w = static_cast<std::size_t>(image.width), h = static_cast<std::size_t>(image.height);

@@ -6,7 +6,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -52,10 +51,15 @@ Journal::~Journal() {
 
 void Journal::lock() {
   for (;;) {
-    file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_APPEND, 0666);
+    // Neither through a link, whose target would be emptied, nor into a pipe that nobody reads.
+    file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_APPEND | O_NOFOLLOW | O_NONBLOCK, 0666);
     if (file_ < 0)
       throw InputError(
           fmt::format("{}: cannot be written: {}; give -o a path in an existing, writable folder", path_, std::strerror(errno)));
+    if (struct stat opened; ::fstat(file_, &opened) != 0 || !S_ISREG(opened.st_mode)) {
+      ::close(file_);
+      throw InputError(path_ + ": is not a regular file; remove it or give another -o");
+    }
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
       ::close(file_);
       throw InputError(path_ + ": another run is writing these results; wait for it or give another -o");
@@ -121,12 +125,12 @@ void Journal::read_line(const std::string& line, const std::string& where, const
     return;
   }
   if (json.contains(kHead)) return read_head(JsonNode(json, where), config_hash);
-  const auto same = [&](const CellRecord& other) {
-    return other.cell.id == record.cell.id && other.cell.name == record.cell.name;
-  };
-  cells_.erase(std::remove_if(cells_.begin(), cells_.end(), same), cells_.end());
   mark_build(record, of_lines_, build_);
-  cells_.push_back(std::move(record));
+  const auto [at, fresh] = place_.try_emplace({record.cell.id, record.cell.name}, cells_.size());
+  if (fresh)
+    cells_.push_back(std::move(record));
+  else
+    cells_[at->second] = std::move(record);
 }
 
 void Journal::write_head(const std::string& config_hash) {

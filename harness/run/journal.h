@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/model/record.h"
@@ -54,6 +56,7 @@ class Journal {
   Build build_, of_lines_;  ///< of this run; of the lines that are being read
   Builds builds_;
   std::vector<CellRecord> cells_;
+  std::map<std::pair<std::string, std::string>, std::size_t> place_;  ///< of a cell by its id and name
 };
 
 }  // namespace nullmark

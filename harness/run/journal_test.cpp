@@ -1,6 +1,7 @@
 #include "harness/run/journal.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -45,8 +46,23 @@ TEST_F(JournalTest, ResumesWithTheLastLineOfEachCell) {
   leave({untimed, cells_[1], cells_[0]});
   Journal journal(results_, "hash", Journal::Mode::resume);
   ASSERT_EQ(journal.cells().size(), 2u);
-  EXPECT_EQ(cell_json(journal.cells()[0]), cell_json(cells_[1]));
-  EXPECT_EQ(cell_json(journal.cells()[1]), cell_json(cells_[0]));
+  EXPECT_EQ(cell_json(journal.cells()[0]), cell_json(cells_[0]));
+  EXPECT_EQ(cell_json(journal.cells()[1]), cell_json(cells_[1]));
+}
+
+/// Neither a link, whose target would be emptied, nor a pipe, which would be waited for.
+TEST_F(JournalTest, IsAFileOfItsOwn) {
+  const std::string target = results_ + ".victim";
+  std::ofstream(target) << "precious";
+  std::filesystem::create_symlink(target, path_);
+  for (const Journal::Mode mode : {Journal::Mode::fresh, Journal::Mode::resume, Journal::Mode::overwrite})
+    EXPECT_NE(open_error("hash", mode).find(path_ + ": cannot be written: "), std::string::npos);
+  EXPECT_EQ(read_file(target), "precious");
+  std::filesystem::remove(target);
+  std::filesystem::remove(path_);
+  ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
+  for (const Journal::Mode mode : {Journal::Mode::fresh, Journal::Mode::resume, Journal::Mode::overwrite})
+    EXPECT_EQ(open_error("hash", mode), path_ + ": is not a regular file; remove it or give another -o");
 }
 
 TEST_F(JournalTest, DropsATornLastLineAndGoesOnAfterIt) {

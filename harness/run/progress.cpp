@@ -79,13 +79,13 @@ void Progress::draw(double done, const std::string& doing) {
   const auto filled = static_cast<std::size_t>(fraction * kBar);
   const std::string bar = std::string(filled, '#') + std::string(kBar - filled, '.');
   const std::string left = fraction > 0 && fraction < 1 ? duration(seconds * (1 - fraction) / fraction) + " left  " : "";
-  notice("\r\x1b[K{}{}{} {}/{} cells  {}{}", colour_ ? "\x1b[32m" : "", bar, colour_ ? "\x1b[0m" : "", done_, total_, left,
-         doing.substr(0, kNameColumns));
+  write_notice(fmt::format("\r\x1b[K{}{}{} {}/{} cells  {}{}", colour_ ? "\x1b[32m" : "", bar, colour_ ? "\x1b[0m" : "", done_,
+                           total_, left, plain_text(doing.substr(0, kNameColumns))));
 }
 
 void Progress::clear() {
   if (!drawn_) return;
-  notice("\r\x1b[K");
+  write_notice("\r\x1b[K");
   drawn_ = false;
 }
 

@@ -117,7 +117,14 @@ std::size_t place_of(const Plan& plan, const std::string& file, const Cell& cell
 /// As many as its verdict took; of a cell that was not sampled, as many as are planned.
 std::uint64_t samples_per_ray(const PreparedCell& cell, const CellRecord& record) {
   if (record.rays == 0 || record.samples == 0) return cell.samples_per_ray;
-  return std::max(record.samples / record.rays, record.verdict ? record.verdict->samples_per_ray : 0);
+  const std::uint64_t samples = std::max(record.samples / record.rays, record.verdict ? record.verdict->samples_per_ray : 0);
+  const std::uint64_t planned = cell.samples_per_ray, allowed = cell.cell->verdict.max_samples_per_ray;
+  const std::uint64_t most = allowed == 0 ? kMostSampleFactor * planned : std::max(planned, allowed);
+  // How many share lookups equally is not in the configuration.
+  if (samples > most && !cell.cell->equal_lookups)
+    throw InputError(fmt::format("cell \"{}\": found {} samples a ray; its configuration allows {}: the results were changed",
+                                 record.cell.name, samples, most));
+  return samples;
 }
 
 /// The numbers that a sample drew, from its stream's begin.

@@ -15,6 +15,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <string_view>
 #include <thread>
 
 #include "harness/io/json_input.h"
@@ -37,6 +38,12 @@ struct CellOutcome {
   std::shared_ptr<CellRecord> record;
   Effort effort;
 };
+
+bool moments_are_finite(const CellRecord& record) {
+  return std::all_of(record.channel.begin(), record.channel.end(), [&](const ChannelRecord& channel) {
+    return channel.mean && (channel.variance || record.cell.samples_per_ray == 1);
+  });
+}
 
 /// Samples and judges a cell.
 CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& families, const std::function<bool()>& late,
@@ -76,6 +83,10 @@ CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& f
     return outcome;
   }
   fill_statistics(record, prepared, *sampled);
+  if (record.status == Status::ok && !moments_are_finite(record)) {
+    record.status = Status::error;
+    record.reason = "its samples are finite, but their mean or variance is beyond the largest number, 1.8e308: scale the scene";
+  }
   if (record.status == Status::ok && verdict && verdict->nonfinite > 0) {
     record.status = Status::error;
     record.nonfinite += verdict->nonfinite;
@@ -284,9 +295,11 @@ std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::v
   const std::function<bool()> ended = [&] { return stop() || late(); };
 
   Records records;
+  std::map<std::string_view, const CellRecord*> by_id;
+  for (const CellRecord& record : finished) by_id[record.cell.id] = &record;
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
-    for (const CellRecord& record : finished)
-      if (selected[i] && record.cell.id == plan.cells[i].id) records[i] = std::make_shared<CellRecord>(record);
+    if (const auto at = by_id.find(plan.cells[i].id); selected[i] && at != by_id.end())
+      records[i] = std::make_shared<CellRecord>(*at->second);
 
   PhaseClock clock(observer);
   const bool timing = options.timing && plan.timing.enabled;

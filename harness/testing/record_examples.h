@@ -55,6 +55,7 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
     record.variance_basis = "analytic";
     for (int c = 0; c < record.channels; ++c)
       record.channel.push_back({next(), next(), next(), -next(), next(), next(), next(), next(), next(), next(), next(), next()});
+    for (ChannelRecord& channel : record.channel) channel.bias = *channel.mean - *channel.reference;
     record.channel[0].kurtosis.reset();
     record.lookups_per_sample = next();
     record.lookups_theory = 5e-324;
