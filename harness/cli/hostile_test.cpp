@@ -68,6 +68,18 @@ TEST(Hostile, SweepsThatMultiplyAreRefused) {
             "c.json: /experiments/0/matrix: its sweeps make more than 100000 cells; split them into several files");
 }
 
+/// Not one experiment alone: the limit is the configuration's.
+TEST(Hostile, ExperimentsThatAddUpAreRefused) {
+  const auto experiment = [](const std::string& name) {
+    return R"({"name":")" + name +
+           R"(","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"linear","begin":)" +
+           sweep(240) + R"(,"end":)" + sweep(240) + "}}}";
+  };
+  EXPECT_EQ(
+      error_of(R"({"nullmark":"config/2","experiments":[)" + experiment("a") + "," + experiment("b") + "]}"),
+      "c.json: /experiments/1: with the experiments before it, it makes more than 100000 cells; split them into several files");
+}
+
 /// Seconds, not hours, for as many as are allowed.
 TEST(Hostile, ManyCellsAreExpandedInLinearTime) {
   const std::string text =

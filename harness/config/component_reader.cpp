@@ -285,8 +285,8 @@ std::vector<MediumSpec> read_given_media(const JsonNode& node) {
 }  // namespace
 
 void expect_cells(const JsonNode& node, std::size_t a, std::size_t b) {
-  constexpr std::size_t kMost = 100'000;
-  if (b > 0 && a > kMost / b) node.fail(fmt::format("its sweeps make more than {} cells; split them into several files", kMost));
+  if (b > 0 && a > kMostCells / b)
+    node.fail(fmt::format("its sweeps make more than {} cells; split them into several files", kMostCells));
 }
 
 std::vector<Component> read_components(ComponentKind kind, const JsonNode& node) {

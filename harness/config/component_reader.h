@@ -8,8 +8,10 @@
 
 namespace nullmark {
 
-/// Throws InputError if a x b combinations are more than a plan may have.  Otherwise a few lists in a small file could fill
-/// memory.
+/// Cells of a configuration, at most.  Otherwise a few lists in a small file could fill memory.
+inline constexpr std::size_t kMostCells = 100'000;
+
+/// Throws InputError if a x b combinations are more.
 void expect_cells(const JsonNode& node, std::size_t a, std::size_t b);
 
 /// The components of an entry such as "ratio" or {"type": "ratio"}, with defaults and labels.  If parameters are lists, returns

@@ -118,6 +118,9 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
       alike.push_back(plan.cells.size());
       plan.cells.push_back(std::move(configured));
     }
+    if (plan.cells.size() > kMostCells)
+      entry.fail(
+          fmt::format("with the experiments before it, it makes more than {} cells; split them into several files", kMostCells));
     const std::string name = entry["name"].string();
     if (std::find(experiments.begin(), experiments.end(), name) != experiments.end())
       entry["name"].fail(fmt::format("\"{}\" is the name of an earlier experiment; expected another", name));
