@@ -40,6 +40,8 @@ std::string members_text(const std::string& type) {
   std::vector<std::string> used, others;
   for (const auto& [member, has] : Registry<EstimatorEntry>::instance().find(type)->members)
     (has ? used : others).push_back(member);
+  // Of a tracker from outside there is no header with members.
+  if (used.empty() && others.empty()) return "";
   return fmt::format("uses: {}; not stated: {}\n", used.empty() ? "no optional member" : fmt::format("{}", fmt::join(used, ", ")),
                      fmt::join(others, ", "));
 }

@@ -98,6 +98,7 @@ typedef struct nullmark_tracker {
   /* Once for every thread that uses the tracker.  `parameters` is a JSON object; an error's text is a line in `error`. */
   int32_t (*create)(const char* parameters, void** state, char* error, int64_t error_size);
   void (*destroy)(void* state);
+  /* `out` comes with its size set, unbiased and of any sign, the rest 0. */
   int32_t (*describe)(void* state, int32_t quantity, int32_t channels, nullmark_description* out);
   /* May be null: exact mean, variance, lookups and variance of the lookups of a sample; NaN where not known. */
   int32_t (*theory)(void* state, const nullmark_ray* ray, int32_t quantity, int32_t channel, double out[4]);
