@@ -198,7 +198,6 @@ std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vect
   refuse_overwriting(inputs_of(sources, plan), {output, Journal::path_for(output)});
   if (std::error_code error; std::filesystem::is_directory(output, error))
     throw InputError(output + ": is a folder; expected the path of a results file");
-  expect_replaceable(output);
   using Mode = Journal::Mode;
   auto journal = std::make_unique<Journal>(output, config_hash(plan.config_text),
                                            command.resume  ? Mode::resume

@@ -29,15 +29,25 @@ std::string aligned(const std::vector<std::vector<std::string>>& lines, std::siz
   return text;
 }
 
+namespace {
+
+/// Text that ends neither a cell nor a line of a table.
+std::string within_cell(const std::string& text) {
+  std::string result;
+  for (const char c : text) result += c == '|' ? "\\|" : c == '\n' ? " " : std::string(1, c);
+  return plain_text(result);
+}
+
+}  // namespace
+
 std::string markdown_cell(const std::string& text) {
   const auto begins_html = [&](std::size_t i) {
     const char next = i + 1 < text.size() ? text[i + 1] : ' ';
     return text[i] == '<' && (std::isalpha(static_cast<unsigned char>(next)) || next == '/' || next == '!' || next == '?');
   };
   std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i)
-    result += text[i] == '|' ? "\\|" : begins_html(i) ? "&lt;" : text[i] == '\n' ? " " : std::string(1, text[i]);
-  return plain_text(result);
+  for (std::size_t i = 0; i < text.size(); ++i) result += begins_html(i) ? "&lt;" : std::string(1, text[i]);
+  return within_cell(result);
 }
 
 std::string markdown_code(const std::string& text) {
@@ -45,9 +55,7 @@ std::string markdown_code(const std::string& text) {
   std::size_t longest = 0, run = 0;
   for (const char c : text) longest = std::max(longest, run = c == '`' ? run + 1 : 0);
   const std::string fence(longest + 1, '`'), space(longest > 0 ? 1 : 0, ' ');
-  std::string code;
-  for (const char c : text) code += c == '|' ? "\\|" : c == '\n' ? " " : std::string(1, c);
-  return fence + space + plain_text(code) + space + fence;
+  return fence + space + within_cell(text) + space + fence;
 }
 
 std::string plain_text(std::string_view text) {

@@ -54,7 +54,7 @@ def damaged(text, rng):
             data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
         return bytes(data)
     if kind == 2:
-        return bytes(data) + b"\0" + os.urandom(64)
+        return bytes(data) + b"\0" + rng.randbytes(64)
     if kind == 3:
         data[at:at] = rng.choice([b"\0", b"\xff\xfe", b"\xc3", b"1e999", b"[" * 500, b'"' * 3, b"\x1b[31m"])
         return bytes(data)
@@ -177,9 +177,8 @@ class Attempt:
                 return f"changed {name}"
         if (self.folder / "owned").exists():
             return "ran a command of the input"
-        for name in ("m.md",):
-            if (self.folder / name).exists() and ("<script" in self.read(name) or "<img" in self.read(name)):
-                return f"HTML of the input in {name}"
+        if (self.folder / "m.md").exists() and ("<script" in self.read("m.md") or "<img" in self.read("m.md")):
+            return "HTML of the input in m.md"
         return None
 
 
