@@ -46,6 +46,8 @@ void expect_same(const std::vector<CellRecord>& a, const std::vector<CellRecord>
     ASSERT_EQ(b[i].status, Status::ok) << b[i].reason;
     EXPECT_EQ(a[i].lookups, b[i].lookups);
     EXPECT_EQ(a[i].draws, b[i].draws);
+    EXPECT_EQ(a[i].majorant_violations, b[i].majorant_violations);
+    EXPECT_EQ(a[i].largest_violation, b[i].largest_violation);
     ASSERT_EQ(a[i].channel.size(), b[i].channel.size());
     for (std::size_t c = 0; c < a[i].channel.size(); ++c) {
       EXPECT_EQ(a[i].channel[c].mean, b[i].channel[c].mean);
@@ -58,6 +60,14 @@ constexpr const char* kMedia =
     R"([{"type":"linear","begin":0.2,"end":2},{"type":"fractal_noise","peak":3},{"type":"linear","spectrum":[1,2,0.5]}])";
 constexpr const char* kBounds =
     R"(["global",{"type":"global","looseness":2},{"type":"grid","resolution":4},{"type":"grid","resolution":4,"crossing":"rewind"}])";
+
+/// Along one bound and along several, or a tracker that needs one could pass without it.
+TEST(Foreign, ViolationsAreCountedAsOfTheBuiltIn) {
+  constexpr const char* kTooLow = R"([{"type":"global","looseness":0.5},{"type":"grid","resolution":4,"looseness":0.5}])";
+  const auto built_in = run(R"("ratio")", kMedia, kTooLow);
+  for (const CellRecord& record : built_in) EXPECT_GT(record.majorant_violations, 0u) << record.cell.name;
+  expect_same(built_in, run(library(NULLMARK_EXAMPLE_LIBRARY, "ratio"), kMedia, kTooLow));
+}
 
 TEST(Foreign, RatioInCHasTheBitsOfTheBuiltIn) {
   const auto built_in = run(R"("ratio")", kMedia, kBounds);
