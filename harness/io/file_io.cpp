@@ -39,14 +39,6 @@ fs::path target_of(const std::string& path) {
   return error ? fs::path(path) : target;
 }
 
-/// A renamed file survives a power cut only once its directory has reached the disk.
-void sync_directory(const fs::path& directory) {
-  const int file = ::open(directory.empty() ? "." : directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (file < 0) return;
-  ::fsync(file);
-  ::close(file);
-}
-
 /// The largest text that is read, packed or not.
 constexpr std::size_t kLargestText = std::size_t{1} << 30;
 
@@ -125,6 +117,14 @@ void make_durable(int file, const std::string& path) {
   if (::fsync(file) != 0 && errno != EINVAL && errno != EROFS) fail(path, "written");
 }
 
+void make_name_durable(const std::string& path) {
+  const fs::path directory = fs::path(path).parent_path();
+  const int file = ::open(directory.empty() ? "." : directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) return;
+  ::fsync(file);
+  ::close(file);
+}
+
 void write_atomically(const std::string& path, const std::string& text) {
   write_atomically(path, [&](const TextSink& to) { to(text); });
 }
@@ -156,7 +156,7 @@ void write_atomically(const std::string& path, const std::function<void(const Te
     ::unlink(temporary.c_str());
     fail(path, "written");
   }
-  sync_directory(target.parent_path());
+  make_name_durable(target.string());
 }
 
 void expect_replaceable(const std::string& path) {

@@ -71,7 +71,9 @@ void Journal::lock() {
 
 void Journal::read(const std::string& config_hash, Mode mode) {
   const std::string text = read_file(path_);
-  const std::size_t complete = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
+  std::size_t complete = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
+  // A power cut may leave zeros of what no sync had put on the disk; of the first line, only before any cell.
+  if (text.substr(0, text.find('\n')).find('\0') != std::string::npos) complete = 0;
   if (complete == 0 || mode == Mode::overwrite) {
     if (::ftruncate(file_, 0) != 0) throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
     write_head(config_hash);
@@ -138,6 +140,7 @@ void Journal::write_head(const std::string& config_hash) {
       {kHead, kJournalSchema}, {kVersionKey, RunRecord::kVersion}, {"config_hash", config_hash}, {"build", build_json(build_)}};
   write_all(file_, head.dump() + "\n", path_);
   make_durable(file_, path_);
+  make_name_durable(path_);
 }
 
 void Journal::append(const CellRecord& record) {

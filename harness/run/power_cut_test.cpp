@@ -1,0 +1,105 @@
+// A power cut at any moment leaves a valid results file or none, and a run that can be resumed: at every step that a run takes on
+// the disk, with what no sync had put there lost, reordered or torn (power_cut.h).
+
+#include "harness/testing/power_cut.h"
+
+#include "harness/testing/ended_run.h"
+
+namespace nullmark {
+namespace {
+
+class PowerCut : public EndedRunTest {
+ protected:
+  static constexpr const char* kResults = "r.json";
+
+  void SetUp() override {
+    EndedRunTest::SetUp();
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "sanitizers want to be preloaded first";
+#endif
+    expected_ = undisturbed("few.json");
+  }
+
+  void put(const DiskFiles& files) const {
+    for (const auto& entry : std::filesystem::directory_iterator(folder_))
+      if (entry.path().filename().string().rfind(kResults, 0) == 0) std::filesystem::remove(entry.path());
+    for (const auto& [name, bytes] : files) std::ofstream(folder_ / name, std::ios::binary) << bytes;
+  }
+
+  DiskFiles files() const {
+    DiskFiles found;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_))
+      if (const std::string name = entry.path().filename().string(); name.rfind(kResults, 0) == 0) found[name] = read(name);
+    return found;
+  }
+
+  /// Runs on these files, and tells the steps.
+  std::vector<DiskStep> steps_of_run(const DiskFiles& before, const std::string& option) const {
+    put(before);
+    const std::filesystem::path log = folder_ / "log";
+    std::filesystem::remove(log);
+    std::vector<std::string> environment = faulty("log", 0);
+    environment.push_back("FAULTY_DISK_LOG=" + log.string());
+    std::vector<std::string> words = {"run", "few.json", "-o", kResults};
+    if (!option.empty()) words.push_back(option);
+    EXPECT_EQ(Process(folder_, words, environment).wait(), 0) << read("err");
+    return read_disk_steps(log, kResults, before);
+  }
+
+  /// Cells that the run had settled, each its line: those of a sync, whose file's name must then be there as well.
+  std::set<std::string> settled(const DiskFiles& before, const std::vector<DiskStep>& steps, std::size_t count) const {
+    std::vector<Kept> kept(count, Kept::all);
+    for (const std::size_t i : unsynced_steps(steps, count))
+      if (steps[i].of_file()) kept[i] = Kept::none;
+    for (std::size_t i = 0; i < count; ++i)
+      if (steps[i].what == "unlink") kept[i] = Kept::none;
+    put(files_after(before, steps, kept));
+    return finished(kResults);
+  }
+
+  /// The number of states that cuts leave, each resumed to the end.
+  std::size_t survive_every_cut(const DiskFiles& before, const std::string& option) {
+    const std::vector<DiskStep> steps = steps_of_run(before, option);
+    std::size_t states = 0;
+    for (std::size_t count = 0; count <= steps.size(); ++count) {
+      const std::set<std::string> kept = option == "--force" ? std::set<std::string>() : settled(before, steps, count);
+      for (const DiskFiles& state : states_after_cut(before, steps, count)) {
+        SCOPED_TRACE(fmt::format("after {} steps, state {}", count, states));
+        put(state);
+        ++states;
+        if (exists(kResults)) {
+          EXPECT_NO_THROW(results(kResults));
+        }
+        expect_kept(kept, finished(kResults));
+        expect_recovers("few.json", kResults, expected_);
+        if (HasFailure()) return states;
+      }
+    }
+    fmt::print("{} steps on the disk, {} states after cuts\n", steps.size(), states);
+    return states;
+  }
+
+  std::string expected_;
+};
+
+TEST_F(PowerCut, OfARun) { EXPECT_GT(survive_every_cut({}, ""), 30u); }
+
+/// A run that a kill has torn.
+TEST_F(PowerCut, OfAResumedRun) {
+  DiskFiles torn;
+  for (int step = 1; torn[Journal::path_for(kResults)].empty() || torn.at(Journal::path_for(kResults)).back() == '\n';
+       ++step) {
+    put({});
+    ASSERT_EQ(Process(folder_, {"run", "few.json", "-o", kResults}, faulty("tear", step)).wait(), 128 + SIGKILL) << "never torn";
+    torn = files();
+  }
+  EXPECT_GT(survive_every_cut(torn, "--resume"), 15u);
+}
+
+TEST_F(PowerCut, OfARunThatReplaces) {
+  ASSERT_EQ(run(std::string("run few.json -o ") + kResults), 0);
+  EXPECT_GT(survive_every_cut(files(), "--force"), 30u);
+}
+
+}  // namespace
+}  // namespace nullmark
