@@ -4,11 +4,15 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/Interpolation.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <map>
+#include <utility>
+#include <vector>
 
 #include "estimators/ratio.h"
 #include "estimators/residual_ratio.h"
@@ -166,6 +170,113 @@ TEST(HardCases, VoxelsOfAnySizeGiveTheSameTransmittance) {
       EXPECT_NEAR(*scaled[i].lookups_theory, *unit[i].lookups_theory, 1e-9 * *unit[i].lookups_theory) << voxel;
     }
   }
+}
+
+/// A volume that readers and walks meet at their limits, and rays through it.
+struct HardVolume {
+  const char* name;
+  double extinction_per_value;
+  std::function<void(openvdb::FloatGrid&)> fill;
+  std::vector<std::pair<openvdb::Vec3d, openvdb::Vec3d>> rays;
+};
+
+std::vector<HardVolume> hard_volumes() {
+  using openvdb::Coord;
+  // Through voxels, along their centres, along their faces and edges, and through their corners.
+  const auto around = [](double at, double size) {
+    const auto ray = [&](openvdb::Vec3d from, openvdb::Vec3d to) {
+      return std::pair(from + openvdb::Vec3d(at), to + openvdb::Vec3d(at));
+    };
+    return std::vector{ray({-2, 0.3, 0.6}, {size, 0.7, 0.2}), ray({-2, 0, 0}, {size, 0, 0}), ray({0, 0.5, size}, {0, 0.5, -2}),
+                       ray({0.5, size, 0.5}, {0.5, -2, 0.5}), ray({-1, -1, -1}, {size, size, size})};
+  };
+  const auto one = [](Coord at, float value) { return [=](openvdb::FloatGrid& grid) { grid.tree().setValue(at, value); }; };
+  const int far = 10'000'000;
+  return {
+      {"one voxel", 2, one({0, 0, 0}, 1), around(0, 3)},
+      {"voxels that touch in an edge and in a corner", 1,
+       [](openvdb::FloatGrid& grid) {
+         for (const Coord& at : {Coord(0, 0, 0), Coord(1, 1, 0), Coord(2, 2, 1)}) grid.tree().setValue(at, 1);
+       },
+       around(0, 4)},
+      {"indices of 1e7", 1,
+       [](openvdb::FloatGrid& grid) {
+         for (int i = 0; i < 4; ++i) grid.tree().setValue({far + i, far, far + i % 2}, 1 + static_cast<float>(i));
+       },
+       around(far, 5)},
+      {"denormal values", 1e40,
+       [](openvdb::FloatGrid& grid) {
+         for (int i = 0; i < 3; ++i) grid.tree().setValue({i, 0, 0}, 1e-40f);
+       },
+       around(0, 4)},
+      {"active zeros around one value", 1,
+       [](openvdb::FloatGrid& grid) {
+         grid.fill(openvdb::CoordBBox({-8, -8, -8}, {15, 15, 15}), 0.f, true);
+         grid.tree().setValue({1, 0, 0}, 2);
+       },
+       around(0, 12)},
+      {"tiles of both levels beside a voxel", 0.01,
+       [](openvdb::FloatGrid& grid) {
+         grid.fill(openvdb::CoordBBox({0, 0, 0}, {127, 127, 127}), 1.f, true);
+         grid.fill(openvdb::CoordBBox({128, 0, 0}, {135, 7, 7}), 3.f, true);
+         grid.tree().setValue({136, 0, 0}, 50);
+       },
+       around(0, 140)},
+      {"contrast of 1e60", 1e-30,
+       [](openvdb::FloatGrid& grid) {
+         for (int i = 0; i < 6; ++i) grid.tree().setValue({i, 0, 0}, i % 2 ? 1e30f : 1e-30f);
+       },
+       around(0, 7)},
+  };
+}
+
+/// exp of the optical depth by the midpoint rule over OpenVDB's own sampler.
+double sampled_transmittance(const openvdb::FloatGrid& grid, const HardVolume& volume, const openvdb::Vec3d& from,
+                             const openvdb::Vec3d& to) {
+  const openvdb::tools::GridSampler<openvdb::FloatGrid, openvdb::tools::BoxSampler> sampler(grid);
+  constexpr int kPoints = 100'000;
+  long double sum = 0;
+  for (int i = 0; i < kPoints; ++i) sum += sampler.isSample(from + (to - from) * ((i + 0.5) / kPoints));
+  return std::exp(-static_cast<double>(sum) / kPoints * (to - from).length() * volume.extinction_per_value);
+}
+
+/// Every tracker, under every structure of bounds, through real files.
+TEST(HardCases, VolumesAtTheirLimits) {
+  openvdb::initialize();
+  const std::string file = fmt::format("{}nullmark_limits_{}.vdb", ::testing::TempDir(), ::getpid());
+  const auto point = [](const openvdb::Vec3d& p) { return fmt::format("[{},{},{}]", p[0], p[1], p[2]); };
+  for (const HardVolume& volume : hard_volumes()) {
+    const auto grid = openvdb::FloatGrid::create(0);
+    grid->setName("density");
+    volume.fill(*grid);
+    openvdb::io::File(file).write({grid});
+    int passed = 0, crossed = 0;
+    for (const auto& [from, to] : volume.rays) {
+      const RunRecord run =
+          run_of(read_config(fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e",
+              "rays":{{"type":"single","from":{},"to":{}}},"samples_per_ray":1024,"verdict":{{"epsilon":0.05,"max_samples_per_ray":200000,"laws":"never"}},
+              "matrix":{{"estimator":["regular","ratio","delta","next_flight_ratio",{{"type":"residual_ratio","control":"minimum"}}],
+                         "majorant":["global",{{"type":"grid","resolution":[3,16]}},"kd_tree","octree","vdb_nodes"],
+                         "medium":{{"type":"vdb","file":"{}","extinction_per_value":{}}}}}}}]}})",
+                                         point(from), point(to), file, volume.extinction_per_value),
+                             "test.json"));
+      const double expected = sampled_transmittance(*grid, volume, from, to);
+      crossed += expected < 1;
+      for (const CellRecord& record : run.cells) {
+        const std::string where = fmt::format("{}, from {} to {}: {}", volume.name, point(from), point(to), record.cell.name);
+        ASSERT_EQ(record.status, Status::ok) << where << ": " << record.reason;
+        EXPECT_EQ(record.nonfinite, 0u) << where;
+        EXPECT_NEAR(*record.channel[0].reference, expected, 1e-6) << where;
+        if (!record.verdict) continue;
+        EXPECT_NE(record.verdict->unbiased, Outcome::fail) << where << ": " << record.verdict->reason;
+        EXPECT_NE(record.verdict->unbiased, Outcome::violated) << where;
+        passed += record.verdict->unbiased == Outcome::pass;
+      }
+    }
+    EXPECT_GE(crossed, 3) << volume.name;
+    EXPECT_GT(passed, 20 * crossed) << volume.name;
+  }
+  std::filesystem::remove(file);
 }
 
 /// The means that hard cases are held to, against arithmetic in long double.
