@@ -86,6 +86,18 @@ class Walker {
   virtual Value transmittance(WalkMemory&, const PathScene<Value>&, Rng&, EventBudget&, Counters&) const = 0;
 };
 
+/// Walks once along a prepared ray and returns the flight at its end.  goes_on() says before each step whether to go on;
+/// look_up(walk, flight) is the extinction there.  All of a step is inlined.
+template <class E, class RayData>
+[[gnu::always_inline]] inline Flight walk_once(const E& estimator, typename E::Walk& walk, const RayData& ray, auto& rng,
+                                               const auto& goes_on, const auto& look_up) {
+  Flight flight;
+  flight.start(ray.majorant);
+  estimator.init(walk, ray, flight, rng);
+  while (goes_on() && estimator.propose(walk, ray, flight, rng)) estimator.consume(walk, ray, flight, look_up(walk, flight), rng);
+  return flight;
+}
+
 /// Walks of an estimator.  If its RayData has a field `Value throughput`, this is set to the weight of the path so far, as
 /// history-aware collision probabilities require [Kutz et al. 2017, Sec. 5].
 template <template <class> class Estimator, class Value>
@@ -151,19 +163,16 @@ class EstimatorWalker final : public Walker<Value> {
   }
 
  private:
-  /// Walks to the end and returns its distance.  All of a step is inlined.
+  /// Walks to the end of the ray or of the budget.
   [[gnu::flatten]] Flight walk(State& state, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget,
                                Counters& counters) const {
-    Flight flight;
-    flight.start(state.ray.majorant);
-    estimator_.init(state.walk, state.ray, flight, rng);
     std::uint64_t lookups = 0;
     const Vec3 origin = state.local.origin, direction = state.local.direction;
-    while (!budget.exhausted() && estimator_.propose(state.walk, state.ray, flight, rng)) {
+    const auto look_up = [&](const Walk& walk, const Flight& flight) {
       const Real t = flight.position();
       const Vec3 p(origin.x() + t * direction.x(), origin.y() + t * direction.y(), origin.z() + t * direction.z());
       if constexpr (Traits::kNeedsShares) {
-        const int component = estimator_.component(state.walk);
+        const int component = estimator_.component(walk);
         state.extinction[0] = path_scene.medium->component_extinction(component, p) / state.ray.shares[flight.piece()][component];
       } else {
         path_scene.medium->extinction({&p.x(), &p.y(), &p.z(), 1}, state.extinction.data());
@@ -172,16 +181,18 @@ class EstimatorWalker final : public Walker<Value> {
       const Value extinction = load<Value>(state.extinction.data(), path_scene.channels);
       if constexpr (!Traits::kIgnoresMajorant)
         audit_majorant(largest(extinction), state.ray.majorant.rate_on_the_way(flight.piece()), counters);
-      estimator_.consume(state.walk, state.ray, flight, extinction, rng);
       budget.spend();
-    }
+      return extinction;
+    };
+    const Flight end = walk_once(
+        estimator_, state.walk, state.ray, rng, [&] { return !budget.exhausted(); }, look_up);
     counters.lookups += lookups;
     if constexpr (!Traits::kIgnoresMajorant) {
       counters.null_collisions += lookups;
       if constexpr (Traits::kRealCollisions)
         counters.null_collisions -= static_cast<std::uint64_t>(estimator_.real_collisions(state.walk, state.ray));
     }
-    return flight;
+    return end;
   }
 
   E estimator_;

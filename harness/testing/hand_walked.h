@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <memory>
 
-#include "harness/kernel/block_kernel.h"
-#include "harness/kernel/optical_depth.h"
+#include "harness/kernel/walker.h"
 #include "media/base/medium.h"
 
 namespace nullmark {
 
-/// A tracker on a ray along x from the origin, its loop run by hand: for tests that look at single walks and their events.
+/// A tracker on a ray along x from the origin, for tests that look at single walks and their events.  They may give other random
+/// numbers.
 template <template <class> class Estimator, class Value = Real>
 class HandWalked {
  public:
@@ -49,15 +49,15 @@ class HandWalked {
   /// A walk that would take more lookups is given up, as the harness does: its lookups are `most`, and it has no result.
   Outcome walk(auto& rng, Real most = kInfinity) const {
     typename E::Walk walk;
-    Flight flight;
-    flight.start(ray.majorant);
-    estimator.init(walk, ray, flight, rng);
-    Outcome outcome;
-    for (; estimator.propose(walk, ray, flight, rng); ++outcome.lookups) {
-      if (outcome.lookups == most) return outcome;
-      estimator.consume(walk, ray, flight, looked_up(walk, flight), rng);
-    }
-    outcome.result = estimator.result(walk, ray);
+    Real lookups = 0;
+    const auto look_up = [&](const auto& at, const Flight& flight) {
+      ++lookups;
+      return looked_up(at, flight);
+    };
+    const Flight flight = walk_once(
+        estimator, walk, ray, rng, [&] { return lookups <= most; }, look_up);
+    if (lookups > most) return {.lookups = most};
+    Outcome outcome{.result = estimator.result(walk, ray), .lookups = lookups};
     if constexpr (requires { estimator.event(walk, ray, flight); }) outcome.event = estimator.event(walk, ray, flight);
     return outcome;
   }
