@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "harness/config/config.h"
 #include "harness/io/json_input.h"
 #include "harness/model/exit_code.h"
@@ -158,6 +160,24 @@ TEST_F(HostileFiles, NamesDoNotReachTheTerminalAsCommands) {
   const std::string summary = read("m.md");
   EXPECT_EQ(summary.find("<script"), std::string::npos) << summary;
   EXPECT_EQ(summary.find('\x1b'), std::string::npos) << summary;
+}
+
+/// Root may read everything, so the program runs without that right.
+TEST_F(HostileFiles, WhatMayNotBeReadIsRefusedInOneLine) {
+  write("v.vdb", "a volume");
+  write("c.json", config(R"({"type":"vdb","file":"v.vdb"})", R"("samples_per_ray":1)"));
+  std::filesystem::permissions(folder_ / "v.vdb", std::filesystem::perms::none);
+  const bool root = ::geteuid() == 0;
+  if (root && std::system("setpriv --bounding-set=-all --inh-caps=-all true 2>/dev/null") != 0)
+    GTEST_SKIP() << "root reads everything, and setpriv is missing";
+  const std::string as_other = root ? "setpriv --bounding-set=-all --inh-caps=-all " : "";
+  const std::string command =
+      fmt::format("cd '{}' && {}'{}' run c.json -o r.json >out 2>err </dev/null", folder_.string(), as_other, NULLMARK_PROGRAM);
+  EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), static_cast<int>(ExitCode::input_error));
+  const std::string error = read("err");
+  EXPECT_NE(error.find("v.vdb"), std::string::npos) << error;
+  EXPECT_NE(error.find("cannot be read: Permission denied"), std::string::npos) << error;
+  EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << error;
 }
 
 TEST_F(HostileFiles, LinksToResultsStayLinks) {

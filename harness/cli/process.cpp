@@ -55,9 +55,10 @@ void tell_and_crash(int number) {
   while (crashed.test_and_set()) ::pause();
   SignalSafeLine line;
   line << "nullmark: crashed (signal " << number << ")";
-  if (const char* cell = InFlight::cell())
-    line << " in cell " << cell << "; `run` keeps the cells that were finished for --resume";
+  if (const char* cell = InFlight::cell()) line << " in cell " << cell;
   if (library_is_loaded()) line << "; if a tracker's library is the cause, \"isolate\": true runs it in a process of its own";
+  if (InFlight::cell())
+    line << "; `run` keeps finished cells beside the results, in *.journal, and --resume continues from there";
   line.write();
   ::signal(number, SIG_DFL);
   ::raise(number);

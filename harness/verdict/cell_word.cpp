@@ -22,7 +22,11 @@ bool takes_variance(const VerdictRecord& verdict) {
 
 std::string mark_text(Mark mark, const CellRecord& record) {
   if (mark == Mark::part_of_depth) return fmt::format("leans on the exact depth ({:.2g} of its answer)", *record.reliance);
-  return mark_name(mark);
+  if (mark != Mark::law) return mark_name(mark);
+  // "replay: why" is the law and why it is not tested.
+  std::vector<std::string> laws;
+  for (const std::string& law : record.verdict->untested) laws.push_back(law.substr(0, law.find(':')));
+  return fmt::format("{} not tested", fmt::join(laws, " and "));
 }
 
 std::string violations_of(const CellRecord& record) {

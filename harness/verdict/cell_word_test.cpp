@@ -72,7 +72,7 @@ TEST(Words, MarksShareOnePairOfParentheses) {
   record = passed_by_own_mean();
   record.verdict->bound_unproven = true;
   record.verdict->untested = {"variance: no bound"};
-  EXPECT_EQ(marked_word(record), "PASS (own mean, bound not proven, law not tested)");
+  EXPECT_EQ(marked_word(record), "PASS (own mean, bound not proven, variance not tested)");
 }
 
 TEST(Words, TheExactDepthIsAMarkOfThoseThatLeanOnIt) {
