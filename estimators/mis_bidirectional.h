@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "estimators/estimator.h"
@@ -92,8 +93,11 @@ struct BidirectionalMis {
     Value sum = a.weight.back() / (2 + a.all_gaps) + b.weight.back() / (2 + b.all_gaps);
     Real heaviest = 0;
     for (const Value& weight : b.weight) heaviest = std::max(heaviest, largest(Value(magnitude(weight))));
+    const Real most = heaviest * static_cast<Real>(b.depth.size());
     std::size_t ahead = b.depth.size();
     for (std::size_t i = 0; i < a.depth.size(); ++i) {
+      // Products of a million factors do not reach 0 but stay at the least denormal number, and all of their pairs add nothing.
+      if (largest(Value(magnitude(a.weight[i]))) * most < std::numeric_limits<Real>::min()) continue;
       while (ahead > 1 && !(b.depth[ahead - 1] > a.depth[i])) --ahead;
       Real gap = exponential(b.depth[ahead - 1] - a.depth[i]);
       for (std::size_t j = ahead; j-- > 0; gap *= b.gap[j]) {
