@@ -20,11 +20,6 @@
 namespace nullmark {
 namespace {
 
-/// Statistical tests here are two-sided at 5.5 standard errors, 4e-8 each, on fixed streams.
-constexpr Real kSigmas = 5.5;
-
-const Real kHalf = std::log(2.);
-
 MajorantGuidedRatio<Real> guided(const char* start) {
   MajorantGuidedRatio<Real> tracker;
   tracker.start = start;
@@ -62,7 +57,7 @@ struct Sampled {
 };
 
 TEST(MajorantGuidedRatio, ReferenceValuesOnTheLinearMedium) {
-  const Theory theory = HandWalked<MajorantGuidedRatio>(guided("majorant"), linear(0, 1, kHalf), 1).theory();
+  const Theory theory = HandWalked<MajorantGuidedRatio>(guided("majorant"), linear(0, 1, kLog2), 1).theory();
   EXPECT_NEAR(*theory.variance, 0.1230, 2e-4);
   EXPECT_NEAR(*theory.lookups, 1.163, 2e-3);
 }
@@ -118,13 +113,13 @@ TEST(MajorantGuidedRatio, TheoryAgreesWithAnIndependentProgram) {
 
 TEST(MajorantGuidedRatio, NoVarianceOnConstantExtinctionWithAStartThatWasLookedUp) {
   for (const Real looseness : {1.12, 2., 50.}) {
-    const HandWalked<MajorantGuidedRatio> walked(guided("lookup"), constant(kHalf), 1, looseness);
+    const HandWalked<MajorantGuidedRatio> walked(guided("lookup"), constant(kLog2), 1, looseness);
     EXPECT_EQ(*walked.theory().variance, 0);
     for (std::uint64_t sample = 0; sample < 3000; ++sample) ASSERT_NEAR(walked.walk(sample).result, 0.5, 1e-13);
   }
   // Where the least rate takes over, or the first flight is not guided, there is some.
-  EXPECT_GT(*HandWalked<MajorantGuidedRatio>(guided("lookup"), constant(kHalf), 1, 1.1).theory().variance, 1e-5);
-  EXPECT_GT(*HandWalked<MajorantGuidedRatio>(guided("majorant"), constant(kHalf), 1, 2).theory().variance, 1e-2);
+  EXPECT_GT(*HandWalked<MajorantGuidedRatio>(guided("lookup"), constant(kLog2), 1, 1.1).theory().variance, 1e-5);
+  EXPECT_GT(*HandWalked<MajorantGuidedRatio>(guided("majorant"), constant(kLog2), 1, 2).theory().variance, 1e-2);
 }
 
 /// sum_i A_i m2^i + 2 sum_{i<j} A_j m2^i m1^{j-i}, term by term.
@@ -132,10 +127,10 @@ TEST(TaylorPinkNoise, VarianceAndLookupsAreTheSeries) {
   using Rule = boost::math::quadrature::gauss_kronrod<Real, 61>;
   for (const Real c : {0.3, 0.8})
     for (const Real looseness : {0.7, 1., 1.3}) {
-      const HandWalked<TaylorPinkNoise> walked(pink(c), linear(0, 1, kHalf), 1, looseness);
-      const Real square = c * c, depth = 2 * kHalf * looseness, scale = 1 / (1 + depth * square);
+      const HandWalked<TaylorPinkNoise> walked(pink(c), linear(0, 1, kLog2), 1, looseness);
+      const Real square = c * c, depth = 2 * kLog2 * looseness, scale = 1 / (1 + depth * square);
       const auto moment = [&](int power) {
-        return Rule::integrate([&](Real x) { return std::pow((depth - 2 * kHalf * x) * scale, power); }, 0., 1.);
+        return Rule::integrate([&](Real x) { return std::pow((depth - 2 * kLog2 * x) * scale, power); }, 0., 1.);
       };
       const Real m1 = moment(1), m2 = moment(2), start = std::pow(1 + depth * square, -1 / square);
       Real mean = 0, second = 0, lookups = -1, chance = 1, inner = 0;  // inner: sum_{i<j} m2^i m1^{j-i}
@@ -150,10 +145,10 @@ TEST(TaylorPinkNoise, VarianceAndLookupsAreTheSeries) {
       }
       mean *= start;
       const Theory theory = walked.theory();
-      EXPECT_NEAR(mean, std::pow(1 + kHalf * square, -1 / square), 1e-12);
+      EXPECT_NEAR(mean, std::pow(1 + kLog2 * square, -1 / square), 1e-12);
       EXPECT_NEAR(*theory.variance, second * start * start - mean * mean, 1e-10);
       EXPECT_NEAR(*theory.lookups, lookups, 1e-9);
-      EXPECT_NEAR(walked.estimator.expected(kHalf, walked.ray), mean, 1e-12);
+      EXPECT_NEAR(walked.estimator.expected(kLog2, walked.ray), mean, 1e-12);
       Sampled sampled;
       for (std::uint64_t sample = 0; sample < 300000; ++sample) {
         const auto outcome = walked.walk(sample);
@@ -189,7 +184,7 @@ TEST(TaylorPinkNoise, NoVarianceUnderATightBoundAndNoneThatIsFiniteUnderALooseOn
 /// After n passes the medium is still unseen with chance e^{-n B d}; a bound that is seen to be too low is never so again.
 TEST(ProgressiveMajorant, BiasOnConstantExtinctionIsThatOfAMediumNotYetSeen) {
   constexpr Real kInitial = 0.25;
-  const auto medium = constant(kHalf);
+  const auto medium = constant(kLog2);
   for (const int passes : {0, 1, 4, 16, 40}) {
     const HandWalked<ProgressiveMajorant> walked(learned(passes, kInitial), medium, 1);
     Estimate bias;

@@ -13,11 +13,6 @@
 namespace nullmark {
 namespace {
 
-/// Statistical tests here are two-sided at 5.5 standard errors, 4e-8 each, on fixed streams.
-constexpr Real kSigmas = 5.5;
-
-constexpr Real kLog2 = 0.6931471805599453;
-
 std::shared_ptr<const Medium> rising() { return linear(0, 2 * kLog2); }
 
 TEST(UnidirectionalMis, TheoryHasTheValuesOfTheClosedForms) {

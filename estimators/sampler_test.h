@@ -16,9 +16,6 @@
 /// Free-path samplers, walk by walk: the laws of their events, and their theory.
 namespace nullmark::sampler_test {
 
-/// Statistical tests here are two-sided at 5.5 standard errors, 4e-8 each, on fixed streams.
-inline constexpr Real kSigmas = 5.5;
-
 inline std::shared_ptr<const Medium> rising_exponential(Real amplitude, Real rate) {
   Exponential field;
   field.profile = {amplitude, rate};

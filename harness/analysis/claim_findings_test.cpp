@@ -10,7 +10,7 @@ namespace nullmark {
 namespace {
 
 /// Cells "a", "b", ... with the given variances, each of 1e6 samples of a normal law.
-RunRecord run_of(const std::vector<Real>& variances) {
+RunRecord run_with(const std::vector<Real>& variances) {
   RunRecord run;
   for (std::size_t i = 0; i < variances.size(); ++i) {
     CellRecord record;
@@ -51,65 +51,65 @@ ClaimOutcome outcome(const RunRecord& run, const ClaimPart& part) { return found
 TEST(Findings, AtMostAndAtLeastAreProvenBrokenOrLeftOpen) {
   ClaimPart part = variance_of({"a"}, Relation::at_most);
   part.numbers = {1};
-  EXPECT_EQ(outcome(run_of({0.9}), part), ClaimOutcome::reproduced);
-  EXPECT_EQ(outcome(run_of({1.1}), part), ClaimOutcome::refuted);
+  EXPECT_EQ(outcome(run_with({0.9}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({1.1}), part), ClaimOutcome::refuted);
   // Two standard errors, sqrt(2/1e6) each, are no proof among several comparisons.
-  EXPECT_EQ(outcome(run_of({1 + 2 * std::sqrt(2e-6)}), part), ClaimOutcome::cannot_tell);
-  EXPECT_EQ(outcome(run_of({1 - 2 * std::sqrt(2e-6)}), part), ClaimOutcome::cannot_tell);
+  EXPECT_EQ(outcome(run_with({1 + 2 * std::sqrt(2e-6)}), part), ClaimOutcome::cannot_tell);
+  EXPECT_EQ(outcome(run_with({1 - 2 * std::sqrt(2e-6)}), part), ClaimOutcome::cannot_tell);
   part.relation = Relation::at_least;
-  EXPECT_EQ(outcome(run_of({0.9}), part), ClaimOutcome::refuted);
-  EXPECT_EQ(outcome(run_of({1.1}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({0.9}), part), ClaimOutcome::refuted);
+  EXPECT_EQ(outcome(run_with({1.1}), part), ClaimOutcome::reproduced);
 }
 
 TEST(Findings, NearIsProvenOnlyInsideItsTolerance) {
   ClaimPart part = variance_of({"a"}, Relation::near);
   part.numbers = {1};
   part.tolerance = 0.05;
-  EXPECT_EQ(outcome(run_of({1.02}), part), ClaimOutcome::reproduced);
-  EXPECT_EQ(outcome(run_of({0.98}), part), ClaimOutcome::reproduced);
-  EXPECT_EQ(outcome(run_of({1.05}), part), ClaimOutcome::cannot_tell);
-  EXPECT_EQ(outcome(run_of({1.07}), part), ClaimOutcome::refuted);
-  EXPECT_EQ(outcome(run_of({0.93}), part), ClaimOutcome::refuted);
+  EXPECT_EQ(outcome(run_with({1.02}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({0.98}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({1.05}), part), ClaimOutcome::cannot_tell);
+  EXPECT_EQ(outcome(run_with({1.07}), part), ClaimOutcome::refuted);
+  EXPECT_EQ(outcome(run_with({0.93}), part), ClaimOutcome::refuted);
   part.numbers.clear();
   part.theory = true;
-  EXPECT_EQ(outcome(run_of({1.02}), part), ClaimOutcome::reproduced);
-  EXPECT_EQ(outcome(run_of({1.07}), part), ClaimOutcome::refuted);
+  EXPECT_EQ(outcome(run_with({1.02}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({1.07}), part), ClaimOutcome::refuted);
 }
 
 TEST(Findings, CounterpartsBringTheirOwnErrorAndTheFactor) {
   ClaimPart part = variance_of({"a"}, Relation::at_most);
   part.others = {"b"};
-  EXPECT_EQ(outcome(run_of({0.99, 1}), part), ClaimOutcome::cannot_tell) << "both are known to .6 %";
-  EXPECT_EQ(outcome(run_of({0.98, 1}), part), ClaimOutcome::reproduced);
-  EXPECT_EQ(outcome(run_of({1.02, 1}), part), ClaimOutcome::refuted);
+  EXPECT_EQ(outcome(run_with({0.99, 1}), part), ClaimOutcome::cannot_tell) << "both are known to .6 %";
+  EXPECT_EQ(outcome(run_with({0.98, 1}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({1.02, 1}), part), ClaimOutcome::refuted);
   part.factor = 0.1;
-  EXPECT_EQ(outcome(run_of({0.98, 1}), part), ClaimOutcome::refuted);
-  EXPECT_EQ(outcome(run_of({0.09, 1}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({0.98, 1}), part), ClaimOutcome::refuted);
+  EXPECT_EQ(outcome(run_with({0.09, 1}), part), ClaimOutcome::reproduced);
   // As a lower bound of opposite sign.
   part.relation = Relation::at_least;
   part.factor = -1;
-  EXPECT_EQ(outcome(run_of({0.98, 1}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({0.98, 1}), part), ClaimOutcome::reproduced);
 }
 
 TEST(Findings, APartIsRefutedByOneOfItsCellsAndOpenForOne) {
   ClaimPart part = variance_of({"a", "b"}, Relation::at_most);
   part.numbers = {1};
-  EXPECT_EQ(outcome(run_of({0.5, 0.5}), part), ClaimOutcome::reproduced);
-  EXPECT_EQ(outcome(run_of({0.5, 1.5}), part), ClaimOutcome::refuted);
-  EXPECT_EQ(outcome(run_of({0.5, 1}), part), ClaimOutcome::cannot_tell);
+  EXPECT_EQ(outcome(run_with({0.5, 0.5}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({0.5, 1.5}), part), ClaimOutcome::refuted);
+  EXPECT_EQ(outcome(run_with({0.5, 1}), part), ClaimOutcome::cannot_tell);
   part.numbers = {1, 2};
-  EXPECT_EQ(outcome(run_of({0.5, 1.5}), part), ClaimOutcome::reproduced) << "one number each";
+  EXPECT_EQ(outcome(run_with({0.5, 1.5}), part), ClaimOutcome::reproduced) << "one number each";
 }
 
 TEST(Findings, WhatWasNotMeasuredOrIsNotKnownProvesNothing) {
   ClaimPart part = variance_of({"a"}, Relation::at_most);
   part.numbers = {1};
-  RunRecord run = run_of({0.5});
+  RunRecord run = run_with({0.5});
   run.cells[0].status = Status::skipped;
   run.cells[0].reason = "no such file";
   EXPECT_EQ(found(run, part).outcome, ClaimOutcome::cannot_tell);
   EXPECT_EQ(found(run, part).compared[0].reason, "no such file");
-  run = run_of({0.5});
+  run = run_with({0.5});
   run.cells[0].channel[0].kurtosis = 1e6;
   EXPECT_EQ(found(run, part).outcome, ClaimOutcome::cannot_tell) << "one sample makes the variance";
   run.cells[0].channel[0].kurtosis.reset();
@@ -120,7 +120,7 @@ TEST(Findings, WhatWasNotMeasuredOrIsNotKnownProvesNothing) {
 
 /// N E[w^2] of two lookups and a weight of mean 1.
 TEST(Findings, TheWeightedCostHasTheErrorsOfItsFactors) {
-  RunRecord run = run_of({1});
+  RunRecord run = run_with({1});
   CellRecord& record = run.cells[0];
   record.outputs = {"weight"};
   record.lookups_per_sample = 2;
@@ -147,7 +147,7 @@ TEST(Findings, TheWeightedCostHasTheErrorsOfItsFactors) {
 TEST(Findings, RoundingIsNoVariance) {
   ClaimPart part = variance_of({"a"}, Relation::at_most);
   part.numbers = {1e-24};
-  RunRecord run = run_of({1e-33});
+  RunRecord run = run_with({1e-33});
   run.cells[0].channel[0].kurtosis = 1e6;
   EXPECT_EQ(outcome(run, part), ClaimOutcome::reproduced);
 }
@@ -157,10 +157,10 @@ TEST(Findings, SlopesAreThoseOfLogarithms) {
   part.slope_against = "lookups_per_sample";
   part.numbers = {-2};
   part.tolerance = 0.05;
-  EXPECT_EQ(outcome(run_of({1, 1. / 4, 1. / 16, 1. / 64}), part), ClaimOutcome::reproduced);
-  EXPECT_EQ(outcome(run_of({1, 1. / 8, 1. / 64, 1. / 512}), part), ClaimOutcome::refuted);
-  EXPECT_EQ(outcome(run_of({1, 1. / 2, 1. / 16, 1. / 32}), part), ClaimOutcome::cannot_tell) << "no straight line";
-  EXPECT_EQ(outcome(run_of({1, 1. / 4, 0, 1. / 64}), part), ClaimOutcome::cannot_tell) << "0 has no logarithm";
+  EXPECT_EQ(outcome(run_with({1, 1. / 4, 1. / 16, 1. / 64}), part), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({1, 1. / 8, 1. / 64, 1. / 512}), part), ClaimOutcome::refuted);
+  EXPECT_EQ(outcome(run_with({1, 1. / 2, 1. / 16, 1. / 32}), part), ClaimOutcome::cannot_tell) << "no straight line";
+  EXPECT_EQ(outcome(run_with({1, 1. / 4, 0, 1. / 64}), part), ClaimOutcome::cannot_tell) << "0 has no logarithm";
 }
 
 /// More comparisons, wider intervals: all of them must hold together.
@@ -169,15 +169,15 @@ TEST(Findings, IntervalsWidenWithTheNumberOfComparisons) {
   one.numbers = many.numbers = {1};
   many.cells.assign(1000, "a");
   const Real at = 1 - 4 * std::sqrt(2e-6);
-  EXPECT_EQ(outcome(run_of({at}), one), ClaimOutcome::reproduced);
-  EXPECT_EQ(outcome(run_of({at}), many), ClaimOutcome::cannot_tell);
+  EXPECT_EQ(outcome(run_with({at}), one), ClaimOutcome::reproduced);
+  EXPECT_EQ(outcome(run_with({at}), many), ClaimOutcome::cannot_tell);
 }
 
 TEST(Findings, VerdictsDecideWhatIsUnbiased) {
   ClaimPart part;
   part.relation = Relation::unbiased;
   part.cells = {"a"};
-  RunRecord run = run_of({1});
+  RunRecord run = run_with({1});
   const auto with = [&](Outcome word) {
     run.cells[0].verdict.emplace();
     run.cells[0].verdict->against = "reference";
@@ -190,7 +190,7 @@ TEST(Findings, VerdictsDecideWhatIsUnbiased) {
 }
 
 TEST(Findings, TheTextHasTheWordTheWorstCellAndByHowMuch) {
-  RunRecord run = run_of({0.5, 3, 2});
+  RunRecord run = run_with({0.5, 3, 2});
   ClaimPart part = variance_of({"a", "b", "c"}, Relation::at_most);
   part.numbers = {1};
   run.claims = {{"C1", "a paper", "Nothing varies by more than 1.", "", {part}}};

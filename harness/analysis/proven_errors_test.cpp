@@ -13,7 +13,7 @@ namespace {
 using namespace comparison_test;
 
 /// A cell whose PASS excludes a bias of `epsilon` of the mean over all rays, and a larger one of a group of them.
-CellRecord passing(Real epsilon) {
+CellRecord passing_to(Real epsilon) {
   CellRecord record = cell("ratio");
   record.verdict.emplace();
   record.verdict->against = "reference";
@@ -47,18 +47,18 @@ struct Shown {
 
 TEST(Compare, AnErrorBelowWhatTheVerdictExcludesIsNotProvenToBeReachable) {
   // One mark, on .1 %, and the line that explains it.
-  const Shown wide({passing(0.01)});
+  const Shown wide({passing_to(0.01)});
   EXPECT_EQ(wide.stars, 2) << wide.text;
   EXPECT_TRUE(wide.has("* not proven to be reachable: PASS excludes a bias above 1 % of the mean, and no smaller one\n"))
       << wide.text;
-  EXPECT_EQ(Shown({passing(0.02)}).stars, 3);
-  EXPECT_EQ(Shown({passing(0.001)}).stars, 0);
-  const Shown both({passing(0.01), passing(0.05), cell("delta")});
+  EXPECT_EQ(Shown({passing_to(0.02)}).stars, 3);
+  EXPECT_EQ(Shown({passing_to(0.001)}).stars, 0);
+  const Shown both({passing_to(0.01), passing_to(0.05), cell("delta")});
   EXPECT_TRUE(both.has("above 1 to 5 % of the mean, and no smaller one; without a PASS none is excluded\n")) << both.text;
 }
 
 TEST(Compare, WithoutAPassNoErrorIsProvenToBeReachable) {
-  CellRecord open = passing(0.001), own = open, lawless = open;
+  CellRecord open = passing_to(0.001), own = open, lawless = open;
   open.verdict->unbiased = Outcome::inconclusive;
   // That it has its own mean says nothing about T.
   own.verdict->against = "own mean";
@@ -73,7 +73,7 @@ TEST(Compare, WithoutAPassNoErrorIsProvenToBeReachable) {
 }
 
 TEST(Compare, ExactTrackersAndMeasuredFloorsNeedNoMark) {
-  CellRecord exact = passing(0.01);
+  CellRecord exact = passing_to(0.01);
   exact.claims = "exact";
   exact.verdict->tests[0].basis = exact.verdict->tests[1].basis = "deterministic";
   exact.verdict->tests[0].rounding = 1e-12;
@@ -83,7 +83,7 @@ TEST(Compare, ExactTrackersAndMeasuredFloorsNeedNoMark) {
 
 /// The unbiased tracker is cheaper from there on only if it reaches the error of both.
 TEST(Compare, ABreakEvenBelowWhatTheVerdictExcludesIsMarked) {
-  const Shown wide({passing(0.01), marching(0.0005)}), narrow({passing(0.0001), marching(0.0005)});
+  const Shown wide({passing_to(0.01), marching(0.0005)}), narrow({passing_to(0.0001), marching(0.0005)});
   EXPECT_TRUE(wide.has(" s, at 0.05 %*")) << wide.text;
   EXPECT_TRUE(narrow.has(" s, at 0.05 %")) << narrow.text;
   EXPECT_EQ(narrow.stars, 0) << narrow.text;

@@ -9,7 +9,7 @@
 namespace nullmark {
 namespace {
 
-std::string error_of(const std::string& text) {
+std::string error_in(const std::string& text) {
   try {
     read_results(text, "r.json");
   } catch (const InputError& error) {
@@ -124,30 +124,30 @@ TEST(ResultsJson, StatisticsLeaveOutTimeProvenanceAndPaths) {
 
 TEST(ResultsJson, ErrorsAreOneLine) {
   const std::string text = results_text(example_results());
-  EXPECT_EQ(error_of(text), "no error");
-  EXPECT_EQ(error_of(replaced(text, "results/2", "results/3")),
+  EXPECT_EQ(error_in(text), "no error");
+  EXPECT_EQ(error_in(replaced(text, "results/2", "results/3")),
             "r.json: /nullmark: found \"results/3\"; expected \"results/2\", the version this program reads");
-  EXPECT_EQ(error_of(R"({"nullmark_schema": 1, "name": "old"})"),
+  EXPECT_EQ(error_in(R"({"nullmark_schema": 1, "name": "old"})"),
             "r.json: are results of version 1; this program reads \"nullmark\": \"results/2\": run their configuration again");
-  EXPECT_EQ(error_of("{}"), "r.json: is not a results file of nullmark; `nullmark run` writes them");
-  EXPECT_EQ(error_of(replaced(text, "\"status\":\"ok\"", "\"status\":\"okay\"")),
+  EXPECT_EQ(error_in("{}"), "r.json: is not a results file of nullmark; `nullmark run` writes them");
+  EXPECT_EQ(error_in(replaced(text, "\"status\":\"ok\"", "\"status\":\"okay\"")),
             "r.json: /cells/0/status: unknown status \"okay\"; expected one of \"ok\", \"skipped\", \"not_run\", \"error\"");
-  EXPECT_EQ(error_of(replaced(text, "\"rays\":1,\"samples_per_ray\"", "\"rays\":-1,\"samples_per_ray\"")),
+  EXPECT_EQ(error_in(replaced(text, "\"rays\":1,\"samples_per_ray\"", "\"rays\":-1,\"samples_per_ray\"")),
             "r.json: /cells/0/rays: found -1; expected a whole number >= 0");
-  EXPECT_EQ(error_of(replaced(text, "\"channels\":3", "\"channels\":2")).substr(0, 29), "r.json: /cells/1/mean: found ");
-  EXPECT_NE(error_of(text.substr(0, text.size() / 2)).find("r.json:"), std::string::npos);
+  EXPECT_EQ(error_in(replaced(text, "\"channels\":3", "\"channels\":2")).substr(0, 29), "r.json: /cells/1/mean: found ");
+  EXPECT_NE(error_in(text.substr(0, text.size() / 2)).find("r.json:"), std::string::npos);
   // Later versions of the same major number may add keys.
-  EXPECT_EQ(error_of(replaced(text, "\"status\":\"ok\"", "\"new\":1,\"status\":\"ok\"")), "no error");
+  EXPECT_EQ(error_in(replaced(text, "\"status\":\"ok\"", "\"new\":1,\"status\":\"ok\"")), "no error");
 }
 
 /// Numbers of a cell that contradict each other.
 TEST(ResultsJson, EditedFilesDoNotFitThemselves) {
   const RunRecord run = example_results();
-  ASSERT_EQ(error_of(results_text(run)), "no error");
+  ASSERT_EQ(error_in(results_text(run)), "no error");
   const auto error_with = [&](const auto& edit) {
     RunRecord edited = run;
     edit(edited.cells[0]);
-    return error_of(results_text(edited));
+    return error_in(results_text(edited));
   };
   EXPECT_NE(error_with([](CellRecord& cell) { *cell.channel[0].bias += 1e-3; }).find("r.json: /cells/0/bias: found bias "),
             std::string::npos);
@@ -157,7 +157,7 @@ TEST(ResultsJson, EditedFilesDoNotFitThemselves) {
             std::string::npos);
   RunRecord twice = run;
   twice.cells.push_back(twice.cells[0]);
-  EXPECT_NE(error_of(results_text(twice)).find("a second time; expected each cell once"), std::string::npos);
+  EXPECT_NE(error_in(results_text(twice)).find("a second time; expected each cell once"), std::string::npos);
 }
 
 TEST(ResultsJson, FilesAreReplacedAtOnce) {

@@ -28,19 +28,19 @@ Replay replay(const RunRecord& run, const CellRecord& record, const SampleChoice
   return replay_sample(run, "c.results.json", record.cell.name, choice);
 }
 
-constexpr std::uint64_t kSamples = 5;
+constexpr std::uint64_t kSamplesPerRay = 5;
 
 /// Means, lookups and draws of a run are those of its samples, one by one.
 void expect_sums(const std::string& matrix) {
   const RunRecord results =
-      run(fmt::format(R"("samples_per_ray":{},"verdict":{{"enabled":false}},"matrix":{{{}}})", kSamples, matrix));
+      run(fmt::format(R"("samples_per_ray":{},"verdict":{{"enabled":false}},"matrix":{{{}}})", kSamplesPerRay, matrix));
   for (const CellRecord& record : results.cells) {
     SCOPED_TRACE(record.cell.name);
     ASSERT_EQ(record.status, Status::ok) << record.reason;
     std::vector<Real> sums(record.channel.size());
     std::uint64_t lookups = 0, draws = 0;
     for (std::uint64_t ray = 0; ray < record.rays; ++ray)
-      for (std::uint64_t i = 0; i < kSamples; ++i) {
+      for (std::uint64_t i = 0; i < kSamplesPerRay; ++i) {
         const Replay sample = replay(results, record, {ray, i});
         ASSERT_EQ(sample.values.size(), sums.size());
         for (std::size_t o = 0; o < sums.size(); ++o) sums[o] += sample.values[o];
@@ -51,7 +51,7 @@ void expect_sums(const std::string& matrix) {
         }
       }
     for (std::size_t o = 0; o < sums.size(); ++o) {
-      const Real mean = sums[o] / static_cast<Real>(kSamples * record.rays);
+      const Real mean = sums[o] / static_cast<Real>(kSamplesPerRay * record.rays);
       EXPECT_NEAR(mean, *record.channel[o].mean, 1e-12 * (1 + std::abs(mean))) << o;
     }
     EXPECT_EQ(lookups, record.lookups);

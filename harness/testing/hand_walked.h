@@ -114,6 +114,12 @@ class HandWalked {
   Ray line_;
 };
 
+/// Two-sided tests of means, on fixed streams, are held to so many standard errors: 4e-8 each.
+inline constexpr Real kSigmas = 5.5;
+
+/// The optical depth of T = 1/2.
+inline constexpr Real kLog2 = 0.6931471805599453;
+
 /// Mean of samples with its standard error.
 struct Estimate {
   Real count = 0, sum = 0, squares = 0;

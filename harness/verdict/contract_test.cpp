@@ -31,7 +31,7 @@ std::string honest_estimators(int channels = 1) {
   return list;
 }
 
-std::vector<CellRecord> run(const std::string& experiment, int threads = 0) {
+std::vector<CellRecord> run_cells(const std::string& experiment, int threads = 0) {
   const std::string text =
       R"({"nullmark":"config/2","name":"test","seed":1,"timing":{"enabled":false},"experiments":[{"name":"cells",)" + experiment +
       "}]}";
@@ -88,7 +88,7 @@ int agreeing(const std::vector<CellRecord>& records) {
 
 /// For every edit: smooth, with jumps, and known only by lookups.
 TEST(Contract, EveryHonestEstimatorMeetsThemOnThreeMedia) {
-  const auto records = run(fmt::format(
+  const auto records = run_cells(fmt::format(
       R"("rays":{},"samples_per_ray":300000,
           "matrix":{{"estimator":[{}],
                     "medium":[{{"type":"linear","begin":1,"end":0,"optical_depth":2,"lo":[-0.2,0,0],"hi":[1.4,1,1]}},
@@ -100,7 +100,7 @@ TEST(Contract, EveryHonestEstimatorMeetsThemOnThreeMedia) {
 }
 
 TEST(Contract, EveryHonestEstimatorMeetsMeanVarianceAndLookupsOnEveryMedium) {
-  const auto records = run(fmt::format(
+  const auto records = run_cells(fmt::format(
       R"("rays":{},"samples_per_ray":300000,
           "matrix":{{"estimator":[{}],"medium":[{}],"majorant":["global",{{"type":"global","looseness":3}},{{"type":"grid","resolution":5}},
                                 {{"type":"kd_tree","resolution":16,"forced_depth":4,"crossing":"rewind"}}]}})",
@@ -109,7 +109,7 @@ TEST(Contract, EveryHonestEstimatorMeetsMeanVarianceAndLookupsOnEveryMedium) {
 }
 
 TEST(Contract, ChromaticMediaAreMetChannelByChannel) {
-  const auto records = run(fmt::format(
+  const auto records = run_cells(fmt::format(
       R"("rays":{{"type":"single","from":[-1,0.5,0.5],"to":[2,0.4,0.6]}},"samples_per_ray":300000,
           "matrix":{{"estimator":[{},{{"type":"delta","walks":"separate"}}],
                     "medium":[{{"type":"linear","optical_depth":0.5,"spectrum":[1,3,0.2],"hi":[1.6,1,1]}},
@@ -128,7 +128,7 @@ TEST(Contract, ChromaticMediaAreMetChannelByChannel) {
 }
 
 TEST(Contract, ControlsOfResidualTrackingMeetTheory) {
-  const auto records = run(
+  const auto records = run_cells(
       R"("rays":{"type":"single","from":[-1,0.5,0.5],"to":[2,0.5,0.5]},"samples_per_ray":300000,
           "matrix":{"estimator":[{"type":"residual_ratio","control":["minimum","average","middle","maximum","medium_average","ray_average","gamma"],
                                   "component":["product","residual"]},
@@ -144,7 +144,7 @@ TEST(Contract, ControlsOfResidualTrackingMeetTheory) {
 
 TEST(Contract, MarchesMeetTheirOwnPredictedMeanAndAreUnbiasedForDepthWhereJittered) {
   for (const char* quantity : {"transmittance", "optical_depth"}) {
-    const auto records = run(fmt::format(
+    const auto records = run_cells(fmt::format(
         R"("quantity":"{}","rays":{},"samples_per_ray":100000,
             "matrix":{{"estimator":[{{"type":"ray_marching","steps":[3,16],"offset":["left","midpoint","right","uniform","stratified"]}}],
                       "medium":[{}]}})",
@@ -204,9 +204,9 @@ TEST(Contract, TheoryColumnsAreThePublishedClosedForms) {
            {R"({"type":"residual_ratio","control":"minimum","rate_scale":0.7})", linear, 1, .23377, 0.970406},
            {R"({"type":"residual_ratio","control":"average","rate_scale":0.7})", linear, 1, .09777, 0.485203}}) {
     const auto records =
-        run(fmt::format(R"("rays":{{"type":"single"}},"samples_per_ray":2,"matrix":{{"estimator":[{}],"medium":[{}],
+        run_cells(fmt::format(R"("rays":{{"type":"single"}},"samples_per_ray":2,"matrix":{{"estimator":[{}],"medium":[{}],
         "majorant":[{{"type":"global","looseness":{}}}]}})",
-                        expected.estimator, expected.medium, expected.looseness));
+                              expected.estimator, expected.medium, expected.looseness));
     SCOPED_TRACE(records.at(0).cell.name);
     EXPECT_NEAR(*records[0].channel[0].variance_theory, expected.variance, 1e-5);
     EXPECT_NEAR(*records[0].lookups_theory, expected.lookups, 2e-6);
@@ -214,7 +214,7 @@ TEST(Contract, TheoryColumnsAreThePublishedClosedForms) {
 }
 
 TEST(Contract, ViolatedMajorantsAreCounted) {
-  const auto records = run(fmt::format(
+  const auto records = run_cells(fmt::format(
       R"("rays":{{"type":"single"}},"samples_per_ray":2000,"matrix":{{"estimator":[{}],"medium":[{{"type":"linear","optical_depth":1}}],
           "majorant":[{{"type":"global","looseness":0.9}}]}})",
       honest_estimators()));
@@ -230,7 +230,7 @@ TEST(Contract, ViolatedMajorantsAreCounted) {
 
 /// Delta trackers under a violated majorant are biased, by exactly what their theory says.
 TEST(Contract, TheoryHoldsWhereTheMajorantIsViolated) {
-  const auto records = run(
+  const auto records = run_cells(
       R"("rays":{"type":"single","from":[0,0.5,0.5],"to":[1,0.5,0.5]},"samples_per_ray":400000,
           "matrix":{"estimator":["delta",{"type":"next_flight_delta","variant":["a","b"]},"residual_delta","ratio","hero_wavelength"],
                     "medium":[{"type":"linear","begin":0.5,"end":1},{"type":"homogeneous","extinction":1.5}],
@@ -252,7 +252,7 @@ TEST(Contract, TheoryHoldsWhereTheMajorantIsViolated) {
 
 TEST(Contract, RaysThatMissOrAreEmptyHaveTransmittanceOneWithoutLookups) {
   for (const char* ray : {R"("from":[-1,5,0],"to":[1,5,0])", R"("from":[-1,0.5,0.5],"to":[-0.5,0.5,0.5])"}) {
-    const auto records = run(fmt::format(
+    const auto records = run_cells(fmt::format(
         R"("rays":{{"type":"single",{}}},"samples_per_ray":10,"matrix":{{"estimator":[{},"ray_marching"],"medium":[{}],
             "majorant":["global",{{"type":"grid","resolution":4}}]}})",
         ray, honest_estimators(), kMedia));
@@ -266,7 +266,7 @@ TEST(Contract, RaysThatMissOrAreEmptyHaveTransmittanceOneWithoutLookups) {
 
 /// Rays of one image hit and miss; a profile is asked for on all of them.
 TEST(Contract, ProfilesBearRaysThatMiss) {
-  const auto records = run(fmt::format(
+  const auto records = run_cells(fmt::format(
       R"("rays":{{"type":"perspective","width":4,"height":4,"view":[-1,-0.4,-0.3],"up":[0,0,1],"distance":2,"field_of_view":60}},
           "quantity":"transmittance_profile","samples_per_ray":64,
           "matrix":{{"estimator":[{}],"medium":[{{"type":"linear","optical_depth":1}}],"majorant":[{{"type":"grid","resolution":4}}]}})",
@@ -283,7 +283,7 @@ TEST(Contract, StatisticsDoNotDependOnThreads) {
       R"("rays":{"type":"orthographic","width":7,"height":5},
           "matrix":{"samples_per_ray":[3,40000],"estimator":["ratio","delta",{"type":"ray_marching","offset":"stratified"}],
                     "medium":[{"type":"fractal_noise","spectrum":[1,0.5]}],"majorant":[{"type":"grid","resolution":4}]})";
-  const auto one = run(experiment, 1), two = run(experiment, 2);
+  const auto one = run_cells(experiment, 1), two = run_cells(experiment, 2);
   ASSERT_EQ(one.size(), two.size());
   ASSERT_EQ(one.size(), 6u);
   for (std::size_t i = 0; i < one.size(); ++i)

@@ -17,7 +17,7 @@
 namespace nullmark {
 namespace {
 
-std::vector<CellRecord> run(const std::string& experiment) {
+std::vector<CellRecord> run_flights(const std::string& experiment) {
   const std::string text =
       R"({"nullmark":"config/2","name":"test","timing":{"enabled":false},"experiments":[{"name":"cells",)" + experiment + "}]}";
   const Plan plan = read_config(text, "test.json");
@@ -35,7 +35,7 @@ constexpr const char* kWavy =
     R"({"type":"sum","media":[{"type":"homogeneous","extinction":1},{"type":"cosine","frequency":6.283185307179586,"phase":0}]})";
 
 TEST(FreePath, HonestSamplersKeepTheLaw) {
-  const auto records = run(fmt::format(
+  const auto records = run_flights(fmt::format(
       R"("quantity":"free_path","rays":"single","samples_per_ray":65536,"verdict":{{"epsilon":0.02,"max_samples_per_ray":4000000}},
          "matrix":{{"estimator":["delta","analog_decomposition","weighted_decomposition","weighted_delta"],"medium":[{}],
                    "majorant":["global",{{"type":"grid","resolution":4}}]}})",
@@ -55,7 +55,7 @@ TEST(FreePath, HonestSamplersKeepTheLaw) {
 
 /// Every bin has its share, and the density within it is wrong; the sampler states no theory.
 TEST(FreePath, TheDistributionIsTestedWithoutATheory) {
-  const auto records = run(
+  const auto records = run_flights(
       R"("quantity":"free_path","rays":"single","samples_per_ray":65536,"verdict":{"epsilon":0.02,"max_samples_per_ray":4000000},
          "matrix":{"estimator":["planted_bin_shape"],"medium":[{"type":"homogeneous","extinction":1}]})");
   ASSERT_TRUE(records.at(0).verdict) << records[0].reason;
@@ -69,7 +69,7 @@ TEST(FreePath, TheDistributionIsTestedWithoutATheory) {
 
 /// Where weights are not 1, and on chromatic media, the verdict says that the distribution was not tested.
 TEST(FreePath, SaysWhereTheDistributionIsNotTested) {
-  const auto records = run(
+  const auto records = run_flights(
       R"("quantity":"free_path","rays":"single","samples_per_ray":1000,
          "matrix":{"estimator":["null_collision"],"medium":[{"type":"linear","albedo":0.5},{"type":"linear","spectrum":[1,0.5]}],
                    "majorant":[{"type":"global","looseness":0.5},"global"]})");
@@ -89,7 +89,7 @@ TEST(FreePath, SaysWhereTheDistributionIsNotTested) {
 
 /// The published listing of analog decomposition forgets the residual's path at each null collision.
 TEST(FreePath, TheListingThatForgetsItsPathIsFoundOut) {
-  const auto records = run(fmt::format(
+  const auto records = run_flights(fmt::format(
       R"("quantity":"free_path","rays":"single","samples_per_ray":65536,"matrix":{{"estimator":["planted_decomposition_reset"],"medium":[{}]}})",
       kWavy));
   ASSERT_EQ(records.size(), 1u);
@@ -99,7 +99,7 @@ TEST(FreePath, TheListingThatForgetsItsPathIsFoundOut) {
 
 /// A flight's scores are all there is: bins, escape and weight add up, and the scattered share is the albedo.
 TEST(FreePath, ScoresAddUp) {
-  const auto records = run(
+  const auto records = run_flights(
       R"("quantity":"free_path","rays":"single","samples_per_ray":100000,
          "matrix":{"estimator":["delta"],"medium":[{"type":"linear","optical_depth":2,"albedo":0.3}]})");
   const CellRecord& record = records.at(0);
@@ -113,7 +113,7 @@ TEST(FreePath, ScoresAddUp) {
 }
 
 TEST(FreePath, AProfileIsTheTransmittanceUpToEachMark) {
-  const auto records = run(
+  const auto records = run_flights(
       R"("quantity":"transmittance_profile","rays":"single","samples_per_ray":200000,
          "matrix":{"estimator":["delta","ratio",{"type":"residual_ratio","control":["minimum","average"]},"residual_delta"],
                    "medium":[{"type":"linear","begin":0.5,"end":2},{"type":"cosine","optical_depth":3,"spectrum":[1,0.5]}],
@@ -128,7 +128,7 @@ TEST(FreePath, AProfileIsTheTransmittanceUpToEachMark) {
 }
 
 TEST(FreePath, SurfacesEndFlights) {
-  const auto records = run(
+  const auto records = run_flights(
       R"("quantity":"free_path","rays":{"type":"single","from":[0,0.5,0.5],"to":[1,0.5,0.5]},"samples_per_ray":100000,
          "transport":{"surfaces":[{"type":"sphere","center":[0.7,0.5,0.5],"radius":0.2}]},
          "matrix":{"estimator":["delta"],"medium":[{"type":"homogeneous","extinction":2}]})");
@@ -141,8 +141,8 @@ TEST(FreePath, SurfacesEndFlights) {
 /// known here cannot be given another value.
 TEST(Radiance, IsJudgedOnlyWhereTheTrackerTakesPart) {
   const auto cell = [](const std::string& transport, const std::string& rest) {
-    return run(R"("quantity":"radiance","rays":"single","samples_per_ray":1000,"transport":)" + transport + "," + rest +
-               R"("matrix":{"estimator":["delta"],"medium":[{"type":"homogeneous","extinction":0.5}]})")
+    return run_flights(R"("quantity":"radiance","rays":"single","samples_per_ray":1000,"transport":)" + transport + "," + rest +
+                       R"("matrix":{"estimator":["delta"],"medium":[{"type":"homogeneous","extinction":0.5}]})")
         .at(0);
   };
   const CellRecord closed = cell(R"({"environment":1})", "");
@@ -159,7 +159,7 @@ TEST(Radiance, IsJudgedOnlyWhereTheTrackerTakesPart) {
 
 /// Results with matter, surroundings and many outputs are read back as they were written.
 TEST(FreePath, ResultsAreReadBack) {
-  const auto records = run(
+  const auto records = run_flights(
       R"("quantity":"free_path","rays":"single","samples_per_ray":1000,
          "transport":{"environment":[0.5],"surfaces":[{"type":"box","low":[2,2,2],"high":[3,3,3],"radiance":1},{"type":"plane","point":[0,0,9],"normal":[0,0,1]}],
                       "next_event":"uniform","roulette_from":null,"most_scatterings":2,"kernel":"general"},

@@ -10,7 +10,7 @@
 namespace nullmark {
 namespace {
 
-std::vector<CellRecord> run(const std::string& experiment, std::uint64_t seed = 1) {
+std::vector<CellRecord> run_on_a_line(const std::string& experiment, std::uint64_t seed = 1) {
   return run_untimed(read_config(
       fmt::format(
           R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e","rays":{{"type":"single",
@@ -19,7 +19,7 @@ std::vector<CellRecord> run(const std::string& experiment, std::uint64_t seed = 
       "judging.json", seed));
 }
 
-const VerdictRecord& verdict_of(const std::vector<CellRecord>& records) { return records.at(0).verdict.value(); }
+const VerdictRecord& first_verdict(const std::vector<CellRecord>& records) { return records.at(0).verdict.value(); }
 
 /// A bias of 0, .3, .9 and 1.1 epsilon where epsilon is tolerated: never a FAIL below it, never a PASS above.
 TEST(Judging, ToleratingEpsilonIsNeverWrong) {
@@ -32,15 +32,15 @@ TEST(Judging, ToleratingEpsilonIsNeverWrong) {
   for (Case one : {Case{0, "ratio", 0.01}, Case{0.3, "planted_slight", 0.01}, Case{0.9, "planted_slight", 0.003 / 0.9},
                    Case{1.1, "planted_slight", 0.003 / 1.1}}) {
     for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-      const auto records = run(
+      const auto records = run_on_a_line(
           fmt::format(
               R"("samples_per_ray":4096,"verdict":{{"epsilon":{},"tolerate":"epsilon","max_samples_per_ray":400000,"laws":"never"}},
                   "matrix":{{"estimator":"{}","medium":{{"type":"homogeneous","extinction":1}},
                              "majorant":{{"type":"global","looseness":50}}}})",
               one.epsilon, one.tracker),
           seed);
-      one.passes += verdict_of(records).unbiased == Outcome::pass;
-      one.fails += verdict_of(records).unbiased == Outcome::fail;
+      one.passes += first_verdict(records).unbiased == Outcome::pass;
+      one.fails += first_verdict(records).unbiased == Outcome::fail;
     }
     std::printf("bias %.1f epsilon: %d PASS, %d FAIL, %d open of 100\n", one.part, one.passes, one.fails,
                 100 - one.passes - one.fails);
@@ -57,10 +57,10 @@ TEST(Judging, ToleratingEpsilonIsNeverWrong) {
 
 /// Walks of 2e6 lookups where theory states fewer than 100: their record would not fit memory.
 TEST(Judging, WalksThatOutgrowARecordingAreSaidToBeUntested) {
-  const auto records = run(R"("samples_per_ray":2,"verdict":{"laws":"always","max_samples_per_ray":2},
+  const auto records = run_on_a_line(R"("samples_per_ray":2,"verdict":{"laws":"always","max_samples_per_ray":2},
                               "matrix":{"estimator":"planted_decomposition_reset","medium":{"type":"linear","optical_depth":100},
                                         "majorant":{"type":"global","looseness":100}})");
-  EXPECT_EQ(verdict_of(records).untested,
+  EXPECT_EQ(first_verdict(records).untested,
             std::vector<std::string>{"laws of walks: walks take more lookups than a recording holds"});
 }
 
@@ -68,28 +68,29 @@ TEST(Judging, WalksThatOutgrowARecordingAreSaidToBeUntested) {
 /// would be sure to decide it.
 TEST(Judging, APlanAboveTheSamplesIsNotExpectedToBeDecided) {
   const std::string cell = R"("samples_per_ray":300000{},"matrix":{{"estimator":"ratio","medium":"cosine"}})";
-  const auto without = run(fmt::format(fmt::runtime(cell), R"(,"verdict":{"epsilon":0.01})"));
-  EXPECT_GT(verdict_of(without).planned, 300000u);
-  EXPECT_TRUE(verdict_of(without).planned_undecidable);
-  EXPECT_EQ(verdict_of(without).reason.rfind("not decidable at 300000 samples a ray", 0), 0u) << verdict_of(without).reason;
-  const auto with = run(fmt::format(fmt::runtime(cell), R"(,"verdict":{"epsilon":0.01,"max_samples_per_ray":1200000})"));
-  EXPECT_EQ(verdict_of(with).unbiased, Outcome::pass);
+  const auto without = run_on_a_line(fmt::format(fmt::runtime(cell), R"(,"verdict":{"epsilon":0.01})"));
+  EXPECT_GT(first_verdict(without).planned, 300000u);
+  EXPECT_TRUE(first_verdict(without).planned_undecidable);
+  EXPECT_EQ(first_verdict(without).reason.rfind("not decidable at 300000 samples a ray", 0), 0u) << first_verdict(without).reason;
+  const auto with =
+      run_on_a_line(fmt::format(fmt::runtime(cell), R"(,"verdict":{"epsilon":0.01,"max_samples_per_ray":1200000})"));
+  EXPECT_EQ(first_verdict(with).unbiased, Outcome::pass);
 }
 
 /// The same bias where none is tolerated: a FAIL once the samples are enough for it, and its size is told.
 TEST(Judging, ToleratingNothingFindsWhatIsBelowEpsilon) {
-  const auto records = run(
+  const auto records = run_on_a_line(
       R"("samples_per_ray":1000000,"verdict":{"epsilon":0.01},"matrix":{"estimator":"planted_slight",
          "medium":{"type":"homogeneous","extinction":1},"majorant":{"type":"global","looseness":50}})");
-  EXPECT_EQ(verdict_of(records).unbiased, Outcome::fail);
-  EXPECT_TRUE(verdict_of(records).biased);
-  EXPECT_FALSE(verdict_of(records).beyond);
-  EXPECT_NE(verdict_of(records).reason.find("+0.3 %"), std::string::npos) << verdict_of(records).reason;
+  EXPECT_EQ(first_verdict(records).unbiased, Outcome::fail);
+  EXPECT_TRUE(first_verdict(records).biased);
+  EXPECT_FALSE(first_verdict(records).beyond);
+  EXPECT_NE(first_verdict(records).reason.find("+0.3 %"), std::string::npos) << first_verdict(records).reason;
 }
 
 /// PASS takes the planned samples, also where the margin is proven sooner.
 TEST(Judging, APassTakesThePlannedSamples) {
-  const auto records = run(
+  const auto records = run_on_a_line(
       R"("samples_per_ray":1024,"verdict":{"max_samples_per_ray":4000000},"matrix":{"estimator":["delta","ratio"],
          "medium":{"type":"linear","optical_depth":[0.1,1]}})");
   for (const CellRecord& record : records) {
@@ -107,45 +108,46 @@ TEST(Judging, APassTakesThePlannedSamples) {
 TEST(Judging, WhatIsAffordableIsDrawn) {
   const std::string cell = R"("samples_per_ray":1024,"verdict":{{"max_samples_per_ray":{}}},"matrix":{{"estimator":"delta",
       "medium":{{"type":"homogeneous","extinction":1}},"majorant":{{"type":"global","looseness":2}}}})";
-  const std::uint64_t planned = verdict_of(run(fmt::format(fmt::runtime(cell), 100'000'000))).planned;
-  const auto records = run(fmt::format(fmt::runtime(cell), planned + planned / 4));
-  EXPECT_GT(verdict_of(records).samples_per_ray, planned);
-  EXPECT_TRUE(verdict_of(records).planned_undecidable);  // a right tracker may stay open there
-  const auto beyond = run(fmt::format(fmt::runtime(cell), planned / 2));
-  EXPECT_EQ(verdict_of(beyond).samples_per_ray, 1024u);
+  const std::uint64_t planned = first_verdict(run_on_a_line(fmt::format(fmt::runtime(cell), 100'000'000))).planned;
+  const auto records = run_on_a_line(fmt::format(fmt::runtime(cell), planned + planned / 4));
+  EXPECT_GT(first_verdict(records).samples_per_ray, planned);
+  EXPECT_TRUE(first_verdict(records).planned_undecidable);  // a right tracker may stay open there
+  const auto beyond = run_on_a_line(fmt::format(fmt::runtime(cell), planned / 2));
+  EXPECT_EQ(first_verdict(beyond).samples_per_ray, 1024u);
 }
 
 /// The allowance is drawn on where half of what proves a bias is there, and where the configuration says so.
 TEST(Judging, AnAllowanceTooSmallIsDrawnForAPromiseOrOnRequest) {
   const std::string cell = R"("samples_per_ray":2048,"verdict":{{"epsilon":1e-4,"max_samples_per_ray":20000{}}},
       "matrix":{{"estimator":"{}","medium":{{"type":"homogeneous","extinction":1}},"majorant":{{"type":"global","looseness":2}}}})";
-  EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), "", "delta"))).samples_per_ray, 2048u);
-  EXPECT_GE(verdict_of(run(fmt::format(fmt::runtime(cell), R"(,"samples":"all")", "delta"))).samples_per_ray, 20000u);
+  EXPECT_EQ(first_verdict(run_on_a_line(fmt::format(fmt::runtime(cell), "", "delta"))).samples_per_ray, 2048u);
+  EXPECT_GE(first_verdict(run_on_a_line(fmt::format(fmt::runtime(cell), R"(,"samples":"all")", "delta"))).samples_per_ray,
+            20000u);
   // A bias of -40 % shows in the first 2048 samples.
-  EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), "", "planted_whole_depth"))).unbiased, Outcome::fail);
+  EXPECT_EQ(first_verdict(run_on_a_line(fmt::format(fmt::runtime(cell), "", "planted_whole_depth"))).unbiased, Outcome::fail);
 }
 
 /// No lookup is met by a bound of 1e-30, so none is counted above it; the medium's own points tell.
 TEST(Judging, AViolationNeedsNoLookup) {
-  const auto records = run(
+  const auto records = run_on_a_line(
       R"("samples_per_ray":4096,"matrix":{"estimator":"delta","medium":{"type":"homogeneous","extinction":1},
          "majorant":{"type":"prescribed","value":[1e-30,1e-5]}})");
   for (const CellRecord& record : records) EXPECT_EQ(record.verdict->unbiased, Outcome::violated) << record.cell.name;
   // Only the box's bound is above the rate here: the cell is judged, and what is not proven is said.
-  const auto noise = run(
+  const auto noise = run_on_a_line(
       R"("samples_per_ray":1048576,"matrix":{"estimator":"delta","medium":{"type":"fractal_noise","peak":3},
          "majorant":{"type":"prescribed","value":2.5}})");
-  EXPECT_EQ(verdict_of(noise).unbiased, Outcome::pass);
-  EXPECT_TRUE(verdict_of(noise).bound_unproven);
+  EXPECT_EQ(first_verdict(noise).unbiased, Outcome::pass);
+  EXPECT_TRUE(first_verdict(noise).bound_unproven);
 }
 
 /// A given reference with an error does not take the place of a closed form, nor break the law of the variance.
 TEST(Judging, AGivenReferenceKeepsATighterOne) {
-  const auto records = run(
+  const auto records = run_on_a_line(
       R"("samples_per_ray":20000,"reference":{"value":0.5,"error":0.6,"source":"a guess"},"verdict":{"laws":"always"},
          "matrix":{"estimator":"ratio","medium":{"type":"homogeneous","extinction":1.01}})");
   EXPECT_EQ(records.at(0).reference_method, "closed_form");
-  EXPECT_NE(verdict_of(records).lawful, Outcome::fail);
+  EXPECT_NE(first_verdict(records).lawful, Outcome::fail);
 }
 
 /// Coordinates that double tells to fewer digits than epsilon: no verdict, rather than a false one; nearer ones are judged.
@@ -171,7 +173,7 @@ TEST(Judging, FarCoordinatesAreNoBias) {
 
 /// The extinction is unbounded at y = 0, which the ray does not touch.
 TEST(Judging, APoleElsewhereIsNoBias) {
-  const auto records = run(
+  const auto records = run_on_a_line(
       R"("samples_per_ray":200000,"verdict":{"epsilon":0.02,"laws":"always"},
          "matrix":{"estimator":["ratio","next_flight_ratio"],"medium":{"type":"exponential_cube","axis":"y"},
                    "majorant":{"type":"prescribed","value":2}})");
@@ -187,21 +189,22 @@ TEST(Judging, StatedVariancesAreTested) {
   const std::string cell =
       R"("samples_per_ray":65536,"verdict":{{"epsilon":0.05}},"matrix":{{"estimator":{{"type":"planted_variance",
       "factor":{}}},"medium":{{"type":"homogeneous","extinction":1}},"majorant":{{"type":"global","looseness":2}}}})";
-  for (const Real factor : {0.23, 4.}) EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), factor))).lawful, Outcome::fail);
-  EXPECT_EQ(verdict_of(run(fmt::format(fmt::runtime(cell), 1.))).lawful, Outcome::pass);
+  for (const Real factor : {0.23, 4.})
+    EXPECT_EQ(first_verdict(run_on_a_line(fmt::format(fmt::runtime(cell), factor))).lawful, Outcome::fail);
+  EXPECT_EQ(first_verdict(run_on_a_line(fmt::format(fmt::runtime(cell), 1.))).lawful, Outcome::pass);
 }
 
 /// No lookup at all, as stated: right, and nothing is divided by 0.
 TEST(Judging, NoLookupIsACountToo) {
-  const auto records = run(
+  const auto records = run_on_a_line(
       R"("samples_per_ray":4096,"matrix":{"estimator":{"type":"planted_exact","error":0},
          "medium":{"type":"homogeneous","extinction":1}})");
-  EXPECT_EQ(verdict_of(records).lookups, Outcome::pass);
+  EXPECT_EQ(first_verdict(records).lookups, Outcome::pass);
 }
 
 /// The guarantee "exact" is one on every sample.
 TEST(Judging, ExactMeansEverySample) {
-  const auto records = run(
+  const auto records = run_on_a_line(
       R"("samples_per_ray":64,"matrix":{"estimator":[{"type":"planted_exact","error":0},{"type":"planted_exact","error":1e-9}],
          "medium":{"type":"homogeneous","extinction":1}})");
   EXPECT_EQ(records.at(0).verdict->unbiased, Outcome::pass);
@@ -211,7 +214,7 @@ TEST(Judging, ExactMeansEverySample) {
 /// Lookups of flights that the harness draws are counted walk by walk; a tracker that looks up twice has none that count.
 TEST(Judging, LookupsAreCountedWhereTheFlightIsTheHarnesss) {
   const auto verdict = [](const std::string& tracker) {
-    return verdict_of(run(fmt::format(
+    return first_verdict(run_on_a_line(fmt::format(
         R"("samples_per_ray":4096,"verdict":{{"max_samples_per_ray":4000000}},"matrix":{{"estimator":"{}",
            "medium":{{"type":"homogeneous","extinction":0.1}},"majorant":{{"type":"global","looseness":2}}}})",
         tracker)));

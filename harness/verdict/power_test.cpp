@@ -30,10 +30,10 @@ struct Row {
 std::vector<Row> rows() {
   // Few enough values that sums of several have a table.
   constexpr Real kResolution = 1e-4;
-  return {{"binary T = .5", coin(0.5), SampleRange::binary, 100},
-          {"binary T = .1", coin(0.1), SampleRange::binary, 20},
-          {"ratio tau = 1", ratio(1, kResolution), SampleRange::unit, 40},
-          {"ratio tau = 2", ratio(2, kResolution), SampleRange::unit, 20},
+  return {{"binary T = .5", coin(0.5), SampleRange::binary, 30},
+          {"binary T = .1", coin(0.1), SampleRange::binary, 10},
+          {"ratio tau = 1", ratio(1, kResolution), SampleRange::unit, 15},
+          {"ratio tau = 2", ratio(2, kResolution), SampleRange::unit, 10},
           {"ratio tau = 5", ratio(5, kResolution), SampleRange::unit, 3}};
 }
 

@@ -11,7 +11,7 @@
 namespace nullmark {
 namespace {
 
-CellRecord run(const std::string& estimator, const std::string& medium, const std::string& rest = "") {
+CellRecord run_told(const std::string& estimator, const std::string& medium, const std::string& rest = "") {
   const Plan plan = read_config(fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[
       {{"name":"told","rays":{{"type":"orthographic","axis":"x","width":4,"height":4}},"samples_per_ray":256,"verdict":{{"laws":"never"}},{}
         "matrix":{{"estimator":[{}],"medium":[{}],"majorant":[{{"type":"global","looseness":2}}]}}}}]}})",
@@ -27,18 +27,18 @@ constexpr const char* kColoured = R"({"type":"linear","optical_depth":2,"spectru
 TEST(Reliance, TellsHowMuchOfTheAnswerIsTheDepth) {
   for (const char* medium :
        {kConstant, kColoured, R"({"type":"homogeneous","extinction":0.01})", R"({"type":"homogeneous","extinction":100})"}) {
-    const CellRecord record = run(R"("closed_form")", medium);
+    const CellRecord record = run_told(R"("closed_form")", medium);
     EXPECT_TRUE(record.given_depth);
     ASSERT_TRUE(record.reliance) << medium;
     EXPECT_NEAR(*record.reliance, 1, 1e-3) << medium;
   }
-  const CellRecord depth = run(R"("closed_form")", kColoured, R"("quantity":"optical_depth",)");
+  const CellRecord depth = run_told(R"("closed_form")", kColoured, R"("quantity":"optical_depth",)");
   ASSERT_TRUE(depth.reliance);
   EXPECT_NEAR(*depth.reliance, 1, 1e-3);
-  const CellRecord normal = run(R"("jackknife_normal")", kConstant);
+  const CellRecord normal = run_told(R"("jackknife_normal")", kConstant);
   ASSERT_TRUE(normal.reliance);
   EXPECT_NEAR(*normal.reliance, 1, 0.02);
-  const CellRecord half = run(R"("planted_half_depth")", kConstant);
+  const CellRecord half = run_told(R"("planted_half_depth")", kConstant);
   ASSERT_TRUE(half.reliance);
   EXPECT_NEAR(*half.reliance, 0.5, 1e-3);
 }
@@ -49,7 +49,7 @@ TEST(Reliance, IsNoneOfAControl) {
   for (const char* component : {"product", "residual"})
     for (const char* medium : {kConstant, kColoured, R"({"type":"cosine","optical_depth":5})"}) {
       const CellRecord record =
-          run(fmt::format(R"({{"type":"residual_ratio","control":"ray_average","component":"{}"}})", component), medium);
+          run_told(fmt::format(R"({{"type":"residual_ratio","control":"ray_average","component":"{}"}})", component), medium);
       SCOPED_TRACE(record.cell.name);
       EXPECT_TRUE(record.given_depth);
       ASSERT_TRUE(record.reliance);
@@ -60,13 +60,13 @@ TEST(Reliance, IsNoneOfAControl) {
 /// Samples that compensate a wrong depth are as rare as it is slight: too few of them tell nothing.
 TEST(Reliance, SaysNothingWhereItCannotTell) {
   const CellRecord thin =
-      run(R"({"type":"residual_ratio","control":"ray_average"})", R"({"type":"homogeneous","extinction":0.001})");
+      run_told(R"({"type":"residual_ratio","control":"ray_average"})", R"({"type":"homogeneous","extinction":0.001})");
   EXPECT_TRUE(thin.given_depth);
   EXPECT_FALSE(thin.reliance);
-  const CellRecord ratio = run(R"("ratio")", kConstant);
+  const CellRecord ratio = run_told(R"("ratio")", kConstant);
   EXPECT_FALSE(ratio.given_depth);
   EXPECT_FALSE(ratio.reliance);
-  const CellRecord flights = run(R"("closed_form")", kConstant, R"("quantity":"free_path",)");
+  const CellRecord flights = run_told(R"("closed_form")", kConstant, R"("quantity":"free_path",)");
   EXPECT_TRUE(flights.given_depth);
   EXPECT_FALSE(flights.reliance);
 }

@@ -62,7 +62,7 @@ TEST(Replays, KeepsSamplesByTheirAddress) {
   }
 }
 
-std::vector<CellRecord> run(const std::string& experiments) {
+std::vector<CellRecord> run_experiments(const std::string& experiments) {
   return run_untimed(read_config(
       fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{}]}})", experiments), "test.json"));
 }
@@ -76,7 +76,7 @@ const LawRecord* replay(const CellRecord& record) {
 
 /// Every judged cell has the law, whatever its quantity and precision, with a number of replays that grows with its samples.
 TEST(Replays, HonestTrackersAreWhatTheyWere) {
-  const auto records = run(R"(
+  const auto records = run_experiments(R"(
       {"name":"lanes","precision":"float","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":1000,
        "matrix":{"estimator":["ratio","delta"],"medium":["cosine"],"majorant":[{"type":"grid","resolution":4}]}},
       {"name":"double","rays":{"type":"orthographic","width":4,"height":4},"samples_per_ray":1000,"verdict":{"laws":"never"},
@@ -99,7 +99,7 @@ TEST(Replays, HonestTrackersAreWhatTheyWere) {
     judged.insert(record.cell.experiment);
   }
   EXPECT_EQ(judged.size(), 5u);
-  const auto more = run(R"({"name":"more","rays":"single",
+  const auto more = run_experiments(R"({"name":"more","rays":"single",
       "matrix":{"samples_per_ray":[1000,100000,1000000],"estimator":["ratio"],"medium":["linear"]}})");
   ASSERT_EQ(more.size(), 3u);
   EXPECT_EQ(replay(more[0])->samples, 48u);
@@ -113,9 +113,10 @@ TEST(Replays, WhoLearnsFromSamplesIsFoundOutOnOneRay) {
   for (const char* rays : {R"("single")", R"({"type":"orthographic","axis":"x","width":8,"height":8})"})
     for (const int samples : {64, 65536}) {
       SCOPED_TRACE(fmt::format("{}, {} samples", rays, samples));
-      const auto records = run(fmt::format(R"({{"name":"learns","rays":{},"samples_per_ray":{},"verdict":{{"laws":"never"}},
+      const auto records =
+          run_experiments(fmt::format(R"({{"name":"learns","rays":{},"samples_per_ray":{},"verdict":{{"laws":"never"}},
           "matrix":{{"estimator":["planted_learned_bound"],"medium":[{{"type":"linear","begin":0.5,"end":1.5}}]}}}})",
-                                           rays, samples));
+                                      rays, samples));
       ASSERT_TRUE(replay(records.at(0)));
       EXPECT_EQ(replay(records[0])->outcome, Outcome::fail);
       EXPECT_EQ(records[0].verdict->lawful, Outcome::fail);

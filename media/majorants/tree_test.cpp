@@ -65,7 +65,7 @@ Affine sheared() {
 }
 
 /// The second checkerboard jumps at planes of the lattice that `trees` has of 13 x 7 x 2 cells: segments end on either side.
-std::vector<MediumPointer> media() {
+std::vector<MediumPointer> tree_media() {
   return {built(Linear{}),
           bump(60),
           noise(200),
@@ -143,7 +143,7 @@ TEST(TreeMajorant, BoundsEveryRayOnContiguousSegments) {
   std::mt19937_64 random(1);
   std::normal_distribution<Real> normal;
   std::uniform_real_distribution<Real> uniform(0, 1);
-  for (const MediumPointer& medium : media())
+  for (const MediumPointer& medium : tree_media())
     for (const auto& tree : trees(*medium))
       for (int i = 0; i < 100; ++i) {
         const Vec3 direction = Vec3(normal(random), normal(random), normal(random)).normalized();
@@ -158,7 +158,7 @@ TEST(TreeMajorant, BoundsEveryRayOnContiguousSegments) {
 TEST(TreeMajorant, BoundsRaysThatGrazeItsPlanes) {
   std::mt19937_64 random(2);
   const Real fractions[] = {0, 0.25, 0.5, 1. / 3, 1};
-  for (const MediumPointer& medium : media())
+  for (const MediumPointer& medium : tree_media())
     for (const auto& tree : trees(*medium))
       for (int axis = 0; axis < 3; ++axis)
         for (const Real u : fractions)
