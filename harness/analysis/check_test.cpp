@@ -299,5 +299,29 @@ TEST_F(Nothing, ADisabledVerdictIsSkippedWithTheReason) {
   EXPECT_NE(read("j.xml").find("nothing claimed: the configuration disables the verdict"), std::string::npos) << read("j.xml");
 }
 
+/// What needs no look is counted where it is much, and never hides what does.
+TEST(CheckText, ManyCellsThatNeedNoLookAreOneLineEach) {
+  RunRecord run = example_results();
+  CellRecord passed = run.cells[0];
+  passed.verdict = verdict_of({passing()});
+  passed.verdict->bound_unproven = true;
+  CellRecord failed = passed;
+  failed.verdict = verdict_of({failing()});
+  decide(*passed.verdict);
+  decide(*failed.verdict);
+  failed.cell.name = "wrong";
+  run.cells.assign(50, passed);
+  run.cells.push_back(failed);
+  const Summary summary = summarise(run);
+  const std::string all = summary_text(run, summary), some = summary_text(run, summary, false);
+  const auto lines = [](const std::string& text) { return std::count(text.begin(), text.end(), '\n'); };
+  // One line stands for 50, and one says how to see them.
+  EXPECT_EQ(lines(all) - lines(some), 48);
+  EXPECT_NE(some.find("PASS (bound not proven): 50 cells of ratio (50)\n"), std::string::npos) << some;
+  EXPECT_NE(some.find("FAIL: wrong: "), std::string::npos) << some;
+  run.cells.erase(run.cells.begin(), run.cells.begin() + 10);
+  EXPECT_EQ(summary_text(run, summary, false), summary_text(run, summary));
+}
+
 }  // namespace
 }  // namespace nullmark

@@ -192,10 +192,11 @@ class CommandLine {
         write_atomically(markdown_, fmt::format("{}{}{}", summary_markdown(run, summary, file_), cases_ ? "\n" : "",
                                                 cases_ ? stability_markdown(run) : ""));
       if (cases_) tell("{}\n", stability_text(run));
-      tell("{}", summary_text(run, summary));
+      tell("{}", summary_text(run, summary, all_));
       return summary.exit;
     });
     command->add_option("RESULTS", file_, "Results file")->required();
+    command->add_flag("--all", all_, "Also list, one by one, cells that need no look where they are many");
     command->add_flag("--cases", cases_,
                       "Also show for each experiment and tracker if all samples were finite, the largest sample, worst error, "
                       "guards that fired");
@@ -333,7 +334,7 @@ class CommandLine {
   ProceduralVdb volume_;
   std::vector<std::string> files_;
   std::string file_, baseline_, builds_, schema_, format_, output_, junit_, markdown_;
-  bool force_ = false, paired_ = false, cases_ = false, strict_ = false;
+  bool force_ = false, paired_ = false, cases_ = false, all_ = false, strict_ = false;
 };
 
 /// Cells of two trackers of one name could not be told apart.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
 #include <vector>
 
@@ -103,6 +104,11 @@ Json cost_json(const RankedCell& ranked) {
           {"pareto", ranked.pareto}};
 }
 
+/// Digits enough for a plot: most of a large page is these numbers.
+Real for_plots(Real x) { return std::isfinite(x) ? std::strtod(fmt::format("{:.6g}", x).c_str(), nullptr) : x; }
+
+Json plotted(const Interval& x) { return interval({for_plots(x.value), for_plots(x.low), for_plots(x.high)}); }
+
 /// Error and variance of means of 1, 2, 4, ... samples as measured, relative to the reference's root mean square; a mean square
 /// over G groups has the relative error sqrt((kurtosis - 1) / G).
 Json convergence_row(const CellRecord& record, const std::optional<Cost>& cost) {
@@ -126,10 +132,11 @@ Json convergence_row(const CellRecord& record, const std::optional<Cost>& cost) 
     const std::optional<Interval> ns = sample_time(*cost, step.samples);
     list.push_back(
         {{"samples", step.samples},
-         {"lookups", number_or_null(record.lookups_per_sample ? std::optional(n * *record.lookups_per_sample) : std::nullopt)},
-         {"seconds", ns ? interval(product(*ns, exactly(n * 1e-9))) : Json(nullptr)},
-         {"rmse", interval(relative(std::sqrt(square) / cost->reference, scatter / 2))},
-         {"variance", interval(relative(variance, scatter))}});
+         {"lookups",
+          number_or_null(record.lookups_per_sample ? std::optional(for_plots(n * *record.lookups_per_sample)) : std::nullopt)},
+         {"seconds", ns ? plotted(product(*ns, exactly(n * 1e-9))) : Json(nullptr)},
+         {"rmse", plotted(relative(std::sqrt(square) / cost->reference, scatter / 2))},
+         {"variance", plotted(relative(variance, scatter))}});
   }
   return list;
 }

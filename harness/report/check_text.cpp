@@ -1,9 +1,11 @@
 #include "harness/report/check_text.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "harness/io/text.h"
 #include "harness/model/names.h"
@@ -95,15 +97,67 @@ std::string families(const RunRecord& run) {
                      off == cells ? fmt::format("all {}", cells) : fmt::format("{} of {}", off, cells));
 }
 
+/// Whether a list of verdicts has the cell: all that are no plain PASS and claim something.
+bool is_listed(const CellRecord& record) {
+  const Kind kind = kind_of(record);
+  return kind != Kind::unclaimed && (kind != Kind::pass || !marks_of(record).empty());
+}
+
+/// Whether somebody should look at a cell of the kind.
+bool needs_attention(Kind kind) { return kind == Kind::fail || kind == Kind::error || kind == Kind::unexpected_open; }
+
+/// Verdict and marks, without the numbers of the cell.
+std::string word_of_group(const CellRecord& record) {
+  std::vector<std::string> marks;
+  for (const Mark mark : marks_of(record)) marks.emplace_back(mark_name(mark));
+  return with_marks(verdict_word(kind_of(record)), marks);
+}
+
+std::string cell_line(const CellRecord& record) {
+  return fmt::format("{}: {}: {}\n", marked_word(record), record.cell.name, finding_of(record));
+}
+
+/// A line for the cells of one word: "PASS (by pilot): 372 cells of mis_bidirectional (216), spectral (40) and 12 more trackers".
+std::string group_line(const std::string& word, const std::vector<const CellRecord*>& cells) {
+  constexpr std::size_t kNamed = 4;
+  std::map<std::string, std::size_t> counts;
+  for (const CellRecord* record : cells) ++counts[record->cell.estimator.type];
+  std::vector<std::pair<std::size_t, std::string>> trackers;
+  for (const auto& [tracker, count] : counts) trackers.emplace_back(count, tracker);
+  std::sort(trackers.begin(), trackers.end(),
+            [](const auto& a, const auto& b) { return a.first != b.first ? a.first > b.first : a.second < b.second; });
+  std::vector<std::string> named;
+  for (std::size_t i = 0; i < std::min(kNamed, trackers.size()); ++i)
+    named.push_back(fmt::format("{} ({})", trackers[i].second, trackers[i].first));
+  const std::size_t more = trackers.size() - named.size();
+  return fmt::format("{}: {} cells of {}{}\n", word, cells.size(), fmt::join(named, ", "),
+                     more > 0 ? fmt::format(" and {} more tracker{}", more, more == 1 ? "" : "s") : "");
+}
+
+/// The cells that nobody need look at one by one, where they are many: a line for each word.
+std::string grouped_lines(const RunRecord& run) {
+  std::map<std::pair<Kind, std::string>, std::vector<const CellRecord*>> groups;
+  for (const CellRecord& record : run.cells)
+    if (is_listed(record) && !needs_attention(kind_of(record)))
+      groups[{kind_of(record), word_of_group(record)}].push_back(&record);
+  std::string text;
+  for (const auto& [key, cells] : groups) text += cells.size() == 1 ? cell_line(*cells[0]) : group_line(key.second, cells);
+  return text + "`nullmark check --all` lists each of them\n";
+}
+
 }  // namespace
 
-std::string summary_text(const RunRecord& run, const Summary& summary) {
-  std::string text;
+std::string summary_text(const RunRecord& run, const Summary& summary, bool all) {
+  constexpr std::ptrdiff_t kFew = 40;
+  const auto quiet = std::count_if(run.cells.begin(), run.cells.end(), [](const CellRecord& record) {
+    return is_listed(record) && !needs_attention(kind_of(record));
+  });
+  const bool grouped = !all && quiet > kFew;
+  std::string text = grouped ? grouped_lines(run) : "";
   for (const Kind kind :
        {Kind::pass, Kind::violated, Kind::expected_open, Kind::not_run, Kind::unexpected_open, Kind::error, Kind::fail})
     for (const CellRecord& record : run.cells)
-      if (kind_of(record) == kind && (kind != Kind::pass || !marks_of(record).empty()))
-        text += fmt::format("{}: {}: {}\n", marked_word(record), record.cell.name, finding_of(record));
+      if (kind_of(record) == kind && is_listed(record) && (!grouped || needs_attention(kind))) text += cell_line(record);
   for (const OrderFit& fit : summary.orders) text += fmt::format("ORDER: {}\n", order_line(fit));
   if (!summary.findings.empty()) text += findings_text(summary.findings);
   for (const std::string& line : remarks_of(run, summary)) text += line + "\n";
@@ -115,16 +169,18 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
       fmt::format("### nullmark check: {}\n\n{}; {}.\n", markdown_cell(run.name), counts(run, summary), families(run));
   for (const std::string& line : remarks_of(run, summary)) text += fmt::format("- {}\n", markdown_cell(line));
   const auto table = [&](std::initializer_list<Kind> kinds, const std::string& title, bool commands) {
+    // GitHub shows no summary above 1 MiB.
+    constexpr std::size_t kMostRows = 200;
     std::string rows;
     std::size_t count = 0;
     for (const CellRecord& record : run.cells)
-      if (std::find(kinds.begin(), kinds.end(), kind_of(record)) != kinds.end() &&
-          (kind_of(record) != Kind::pass || !marks_of(record).empty())) {
+      if (std::find(kinds.begin(), kinds.end(), kind_of(record)) != kinds.end() && is_listed(record)) {
+        if (++count > kMostRows) continue;
         rows += fmt::format("| {} | {} | {} |\n", marked_word(record), markdown_cell(record.cell.name),
                             markdown_cell(finding_of(record)));
         if (commands) rows += fmt::format("| | | {} |\n", markdown_code(reproduction(record, file)));
-        ++count;
       }
+    if (count > kMostRows) rows += fmt::format("| | and {} more | |\n", count - kMostRows);
     if (count > 0)
       text +=
           fmt::format("\n<details{}><summary>{} ({})</summary>\n\n| verdict | cell | reason |\n|---|---|---|\n{}\n</details>\n",

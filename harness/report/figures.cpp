@@ -5,8 +5,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <boost/archive/iterators/binary_from_base64.hpp>
-#include <boost/archive/iterators/transform_width.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -14,20 +12,10 @@
 
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
+#include "harness/report/packing.h"
 
 namespace nullmark {
 namespace {
-
-std::string from_base64(std::string_view text) {
-  using namespace boost::archive::iterators;
-  using Decoder = transform_width<binary_from_base64<std::string_view::const_iterator>, 8, 6>;
-  while (!text.empty() && text.back() == '=') text.remove_suffix(1);
-  // An incomplete last byte is what the padding stood for.
-  const std::size_t bytes = text.size() * 6 / 8;
-  std::string result;
-  for (Decoder at(text.begin()); result.size() < bytes; ++at) result += *at;
-  return result;
-}
 
 std::string quoted(const std::string& text) {
   std::string result = "'";

@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/archive/iterators/base64_from_binary.hpp>
-#include <boost/archive/iterators/transform_width.hpp>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 
+#include "harness/report/packing.h"
 #include "harness/run/image.h"
 
 namespace nullmark {
@@ -16,14 +15,6 @@ namespace {
 
 /// Pixels across that a page shows; larger pictures are averaged down.
 constexpr int kMostPixels = 256;
-
-std::string base64(const std::string& bytes) {
-  using namespace boost::archive::iterators;
-  using Encoder = base64_from_binary<transform_width<std::string::const_iterator, 6, 8>>;
-  std::string text(Encoder(bytes.begin()), Encoder(bytes.end()));
-  text.append((3 - bytes.size() % 3) % 3, '=');
-  return text;
-}
 
 struct Picture {
   int width = 0, height = 0;

@@ -3,6 +3,8 @@
 #include <map>
 #include <string_view>
 
+#include "harness/report/packing.h"
+
 // The parts of the page, as they lie in the source and the build folder.
 #define NULLMARK_ASSET(name, path)                              \
   asm(".pushsection .rodata\n"                                  \
@@ -17,6 +19,7 @@
 
 NULLMARK_ASSET(page, NULLMARK_REPORT_FOLDER "/page.html");
 NULLMARK_ASSET(style, NULLMARK_REPORT_FOLDER "/page.css");
+NULLMARK_ASSET(boot, NULLMARK_REPORT_FOLDER "/page_boot.js");
 NULLMARK_ASSET(script, NULLMARK_PAGE_SCRIPT);
 NULLMARK_ASSET(plotly, NULLMARK_PLOTLY);
 NULLMARK_ASSET(plotly_licence, NULLMARK_PLOTLY_LICENCE);
@@ -40,25 +43,17 @@ std::string html(std::string_view text) {
   return result;
 }
 
-/// JSON that cannot end the script it stands in.
-std::string json_in_html(const Json& data) {
-  std::string result;
-  for (const char c : data.dump(-1, ' ', false, Json::error_handler_t::replace)) {
-    if (c == '<')
-      result += "\\u003c";
-    else
-      result += c;
-  }
-  return result;
-}
-
 }  // namespace
 
 std::string report_page(const Json& data) {
   const std::map<std::string_view, std::string> parts = {
-      {"title", html(data.value("title", "nullmark"))},     {"css", std::string(NULLMARK_ASSET_TEXT(style))},
-      {"plotly", std::string(NULLMARK_ASSET_TEXT(plotly))}, {"plotly_licence", html(NULLMARK_ASSET_TEXT(plotly_licence))},
-      {"script", std::string(NULLMARK_ASSET_TEXT(script))}, {"data", json_in_html(data)}};
+      {"title", html(data.value("title", "nullmark"))},
+      {"css", std::string(NULLMARK_ASSET_TEXT(style))},
+      {"plotly", std::string(NULLMARK_ASSET_TEXT(plotly))},
+      {"plotly_licence", html(NULLMARK_ASSET_TEXT(plotly_licence))},
+      {"boot", std::string(NULLMARK_ASSET_TEXT(boot))},
+      {"script", std::string(NULLMARK_ASSET_TEXT(script))},
+      {"data", packed(data.dump(-1, ' ', false, Json::error_handler_t::replace))}};
   const std::string_view page = NULLMARK_ASSET_TEXT(page);
   std::string result;
   std::size_t at = 0;

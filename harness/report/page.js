@@ -2,8 +2,10 @@
 
 const sections = [
   { id: "summary", title: "Summary", says: "How many trackers keep their claims, and which one is fastest where.", present: () => true, build: buildSummary },
+  { id: "outcomes", title: "Verdicts", says: "Which tracker keeps its claims on which medium; a field leads to its cells.", present: () => report.scenes.length > manyScenes && report.cells.some((cell) => cell.verdict), build: buildVerdictMatrix },
   { id: "tables", title: "Tables", says: "Do the figures that someone published come out again, and where they do not, what makes the difference?", present: () => report.tables.length > 0, build: buildTables },
   { id: "claims", title: "Claims", says: "Does what was published hold? A refuted claim is a result; what cannot be told needs more samples, or a scene that is not here.", present: () => report.claims.length > 0, build: buildClaims },
+  { id: "times", title: "Time to 1\u00a0%", says: "How long each tracker takes on one thread until the error of one ray is 1\u00a0% of the root mean square of the reference. Bars are 95\u00a0% intervals.", present: () => report.cells.some(reachesTheError), build: buildTimes },
   { id: "ranking", title: "Ranking", says: "Which tracker reaches an error soonest; = marks those that the measurements cannot tell apart. Brackets are 95 % intervals.", present: () => report.cells.some((cell) => cell.cost), build: buildRanking },
   { id: "error", title: "Error", says: "How the error falls with work: parallel to the dotted line where it is noise alone, level where bias is left.", present: () => usefulConvergenceViews().length > 0, build: buildError },
   { id: "pareto", title: "Pareto front", says: "Which trackers no other beats in both variance and time of a sample.", present: () => report.cells.some(hasParetoPoint), build: buildPareto },
@@ -25,7 +27,7 @@ function updateAll() {
 /** One scene is chosen for all sections that show one at a time. */
 function chooseScene(index) {
   chosenScene = index;
-  for (const id of ["ranking", "error", "pareto", "maps", "strips"]) updates.get(id)?.();
+  for (const id of ["times", "ranking", "error", "pareto", "maps", "strips"]) updates.get(id)?.();
 }
 
 function mount({ id, title, says, build }) {

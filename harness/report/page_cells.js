@@ -98,8 +98,9 @@ function sortedWord(column) {
   return cellTable.descending ? "descending" : "ascending";
 }
 
-/** Has the table of every cell show those of an outcome; set once the table is there. */
+/** Have the table of every cell show those of an outcome, or with some words in their names; set once the table is there. */
 let chooseOutcome = () => {};
+let searchCells = () => {};
 
 function cellTableControls(update) {
   const change = (key) => (value) => {
@@ -114,6 +115,10 @@ function cellTableControls(update) {
     change("outcome")(choice.select.value);
   };
   const search = element("input", { type: "search", id: "search", oninput: () => change("words")(search.value) });
+  searchCells = (words) => {
+    search.value = words;
+    change("words")(words);
+  };
   return element("div", { className: "controls" }, choice.label, element("label", { className: "choice" }, "Words in the name ", search));
 }
 

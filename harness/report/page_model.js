@@ -1,6 +1,7 @@
 // The data, and what of it the filters let through.
 
-const report = JSON.parse(document.getElementById("data").textContent);
+const report = JSON.parse(unpackedData);
+unpackedData = "";
 
 const facets = [
   { key: "estimator", title: "Estimators", hidden: new Set() },

@@ -13,6 +13,7 @@
 #include "harness/config/config.h"
 #include "harness/io/text.h"
 #include "harness/model/names.h"
+#include "harness/sampling/test_plan.h"
 
 namespace nullmark {
 namespace {

@@ -149,14 +149,14 @@ const char* verdict_word(Kind kind) {
   return "nothing claimed";
 }
 
-std::string marked_word(const CellRecord& record) {
-  const std::string word = verdict_word(kind_of(record));
-  const std::vector<std::string> marks = mark_texts(record);
+std::string with_marks(const std::string& word, const std::vector<std::string>& marks) {
   if (marks.empty()) return word;
   // One pair of parentheses: "INCONCLUSIVE (as planned, by laws)".
   if (word.back() == ')') return fmt::format("{}, {})", word.substr(0, word.size() - 1), fmt::join(marks, ", "));
   return fmt::format("{} ({})", word, fmt::join(marks, ", "));
 }
+
+std::string marked_word(const CellRecord& record) { return with_marks(verdict_word(kind_of(record)), mark_texts(record)); }
 
 std::string standing_of(const CellRecord& record) {
   if (kind_of(record) != Kind::unclaimed) return marked_word(record);

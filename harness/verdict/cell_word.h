@@ -37,6 +37,9 @@ std::vector<std::string> mark_texts(const CellRecord& record);
 /// "PASS", "INCONCLUSIVE (as planned)".
 const char* verdict_word(Kind kind);
 
+/// "PASS (by pilot, own mean)".
+std::string with_marks(const std::string& word, const std::vector<std::string>& marks);
+
 /// The word for a cell with its marks, the same in every output: "PASS (by pilot, own mean)".
 std::string marked_word(const CellRecord& record);
 

@@ -56,7 +56,7 @@ class ContentsTest(PageTest):
 
     @once
     def test_22_tables_show_the_pictures_of_their_cells(self):
-        if not self.js("return Object.values(JSON.parse(document.getElementById('data').textContent).images).length"):
+        if not self.js("return Object.values(report.images).length"):
             self.skipTest("the results have no pictures")
         if not TABLES:
             self.skipTest("the results have no tables")
@@ -112,7 +112,7 @@ class ContentsTest(PageTest):
 
     @once
     def test_28_claims_show_their_verdicts(self):
-        claims = self.js("return JSON.parse(document.getElementById('data').textContent).claims")
+        claims = self.js("return report.claims")
         if not claims:
             self.skipTest("the results have no claims")
         rows = self.browser.find_elements(By.CSS_SELECTOR, "#claims tbody tr")
@@ -122,3 +122,25 @@ class ContentsTest(PageTest):
             for expected in [claim["id"], claim["finding"], claim["claim"], claim["source"]] + [part["figures"] for part in claim["parts"]]:
                 self.assertIn(expected, text)
         self.detail = f"{len(claims)} claims"
+
+    @once
+    def test_29_the_matrix_counts_every_cell(self):
+        wanted = self.js("return report.scenes.length > manyScenes && report.cells.some((cell) => cell.verdict)")
+        rows = self.js("""return [...document.querySelectorAll("#outcomes tbody tr")].map((row) =>
+            [row.children[0].textContent, row.children[1].textContent, row.querySelectorAll(".field").length])""")
+        self.assertEqual(bool(rows), wanted)
+        if not wanted:
+            self.skipTest("few scenes, or none judged")
+        for tracker, text, fields in rows:
+            own = [cell for cell in CELLS if cell["estimator"]["type"] == tracker]
+            passed = sum((cell["verdict"] or {}).get("unbiased") == "PASS" for cell in own)
+            self.assertRegex(text, rf"^{passed} of {len(own)} PASS")
+            self.assertEqual(fields, len({cell["medium"]["type"] for cell in own}))
+        self.assertEqual(len({row[0] for row in rows}), len({cell["estimator"]["type"] for cell in CELLS}))
+        field = self.find("#outcomes .field")
+        self.js("arguments[0].click()", field)
+        tracker, medium = field.get_attribute("aria-label").split(":")[0].split(" on ")
+        named = sum(tracker in cell["name"] and medium in cell["name"] for cell in CELLS)
+        self.assertIn(f"of {named}", self.find("#shown").text)
+        self.js("searchCells('')")
+        self.detail = f"{len(rows)} trackers"

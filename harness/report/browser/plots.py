@@ -1,12 +1,10 @@
 """Every plot is there and shows data."""
 
-import json
-
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
 from .page import PLOTS, PageTest
-from .results import CELLS
+from .results import CELLS, timed
 from .views import once, once_a_layout
 
 
@@ -36,7 +34,7 @@ class PlotsTest(PageTest):
     def test_31_no_plot_is_missing(self):
         plots = self.js(PLOTS)
         count = {section: sum(plot["section"] == section for plot in plots) for section in {plot["section"] for plot in plots}}
-        data = json.loads(self.js("return document.getElementById('data').textContent"))
+        data = self.js("return report")
 
         def scenes(has):
             return sum(any(has(data["cells"][entry["cell"]]) for entry in scene["ranking"]) for scene in data["scenes"])
@@ -48,6 +46,8 @@ class PlotsTest(PageTest):
         untimed = scenes(lambda cell: any(step["lookups"] and step["rmse"]["value"] for step in cell["convergence"]))
         self.assertEqual(count.get("error", 0), one_or_few(timed or untimed))
         self.assertEqual(count.get("pareto", 0), one_or_few(scenes(has_two_costs)))
+        reached = scenes(lambda cell: cell["cost"] and cell["cost"]["seconds"][0]["reached"] and cell["cost"]["seconds"][0]["value"])
+        self.assertEqual(count.get("times", 0), one_or_few(reached))
         costs = any(cell["cost"] and cell["cost"]["variance_x_lookups"] for cell in data["cells"])
         self.assertEqual(count.get("matrix", 0), int(costs))
 
@@ -78,8 +78,19 @@ class PlotsTest(PageTest):
         self.assertGreaterEqual(min(spans), 3)
 
     @once
+    def test_36_times_are_sorted_and_named(self):
+        self.draw_all()
+        plots = self.js("""return [...document.querySelectorAll("#times .graph")].map((plot) => ({
+            seconds: plot.data.map(({ x }) => x[0]), rows: plot.data.map(({ y }) => y[0]), names: plot.layout.yaxis.ticktext }))""")
+        self.assertEqual(bool(plots), timed())
+        for plot in plots:
+            self.assertEqual(plot["seconds"], sorted(plot["seconds"]))
+            self.assertEqual(plot["rows"], list(range(len(plot["names"]))))
+            self.assertEqual(len(plot["seconds"]), len(plot["names"]))
+
+    @once
     def test_34_only_what_is_right_is_exact(self):
-        cells = json.loads(self.js("return document.getElementById('data').textContent"))["cells"]
+        cells = self.js("return report")["cells"]
         still = [cell for cell in cells if cell["cost"] and cell["cost"]["variance"]["value"] == 0]
         wrong = [cell for cell in still if (cell["cost"]["floor"] or {}).get("high")]
         texts = self.js("return [...document.querySelectorAll('#matrix .graph')].flatMap((plot) => plot.layout?.annotations ?? []).map(({ text }) => text)")

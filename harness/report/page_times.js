@@ -1,0 +1,67 @@
+// Time to an error, tracker by tracker: the first plot of a page that was timed.
+
+function reachesTheError(cell) {
+  const time = secondsTo(cell, 0);
+  return Boolean(time?.reached && isNumber(time.value) && time.value > 0);
+}
+
+function timeTrace(cell, row, theme) {
+  const style = styleOf(cell.label, theme);
+  const time = secondsTo(cell, 0);
+  return {
+    type: "scatter",
+    mode: "markers",
+    x: [time.value],
+    y: [row],
+    error_x: errorBars([time], style),
+    marker: { color: style.colour, symbol: style.symbol, size: 10 },
+    hoverinfo: "text",
+    text: [plotLines([labelWithFloor(cell), `${formatInterval(time, formatSeconds)}${unprovenMark(time)}`, cell.marked_word])],
+    showlegend: false,
+  };
+}
+
+function timesPlot(scene, width, theme) {
+  const cells = cellsOf(scene).filter(reachesTheError).sort((a, b) => secondsTo(a, 0).value - secondsTo(b, 0).value);
+  const rows = cells.map((_, row) => row);
+  const mark = (cell) => outcomeMarks[outcomeOf(cell)] ?? "";
+  const name = (cell) => plotText(`${shortened(cell.label, width < 620 ? 32 : 60)} ${mark(cell)}`);
+  return {
+    traces: cells.map((cell, row) => timeTrace(cell, row, theme)),
+    layout: {
+      ...baseLayout(theme),
+      height: 80 + 21 * cells.length,
+      xaxis: logAxis(theme, "seconds a ray until the error is 1\u00a0%", cells.map((cell) => secondsTo(cell, 0).value)),
+      yaxis: { ...axis(theme, ""), tickmode: "array", tickvals: rows, ticktext: cells.map(name), range: [cells.length - 0.4, -0.6] },
+    },
+  };
+}
+
+function timesCaption(scene) {
+  const never = cellsOf(scene).filter((cell) => secondsTo(cell, 0)?.reached === false && hasCostAndTime(cell));
+  const words = [...new Set(cellsOf(scene).filter(reachesTheError).map(outcomeOf))];
+  return [
+    `${words.map((word) => `${outcomeMarks[word] ?? ""} ${word}`.trim()).join(", ")}.`,
+    never.length > 0 ? `Never, because of a bias that no number of samples removes: ${listed(never.map(labelWithFloor))}.` : "",
+    unprovenHint(cellsOf(scene).map((cell) => secondsTo(cell, 0))),
+  ].filter(Boolean).join(" ");
+}
+
+function timesNumbers(scene) {
+  const rows = cellsOf(scene).filter(hasCostAndTime).map((cell) => [markedLabel(cell.label), reachedText(cell, 0), outcomeBadge(cell.marked_word, outcomeOf(cell))]);
+  return plainTable(["estimator", "seconds a ray to 1\u00a0%", "verdict"], rows);
+}
+
+function timesFigure(scene) {
+  return {
+    title: scene.short,
+    caption: timesCaption(scene),
+    height: 80 + 21 * cellsOf(scene).filter(reachesTheError).length,
+    describe: (width, theme) => timesPlot(scene, width, theme),
+    numbers: () => timesNumbers(scene),
+  };
+}
+
+function buildTimes(body) {
+  return scenePanels(body, reachesTheError, (panel, scene) => addFigure(panel, timesFigure(scene)));
+}
