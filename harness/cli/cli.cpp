@@ -268,6 +268,7 @@ class CommandLine {
       return list_command(list_);
     });
     command->add_option("WHAT", list_.what, "estimators, media, majorants, rays or quantities");
+    command->add_option("NAME", list_.name, "Only this one of them");
     command->add_flag("--json", list_.json, "Print JSON");
   }
 

@@ -260,6 +260,16 @@ TEST_F(Cli, ListsSchemasAndVersion) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "c.results.json"));
 }
 
+TEST_F(Cli, ListsOneByItsName) {
+  EXPECT_EQ(run("list estimators ratio"), 0);
+  EXPECT_EQ(read("out").rfind("ratio\n", 0), 0u) << read("out");
+  EXPECT_EQ(read("out").find("delta"), std::string::npos) << read("out");
+  EXPECT_EQ(run("list media linaer"), 2);
+  EXPECT_EQ(read("err"), "nullmark: list media: found \"linaer\"; did you mean \"linear\"?\n");
+  EXPECT_EQ(run("list rays nothing_like_it"), 2);
+  EXPECT_EQ(read("err"), "nullmark: list rays: found \"nothing_like_it\"; `list rays` shows all of them\n");
+}
+
 TEST_F(Cli, ADryRunOfNothingEndsAsTheRunWould) {
   write("v.json", R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":1,
       "matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"absent.vdb","optional":true}}}]})");

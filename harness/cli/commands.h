@@ -89,6 +89,7 @@ ExitCode report_command(const ReportCommand& command);
 /// `nullmark list`.
 struct ListCommand {
   std::string what;  ///< "estimators", "media", "majorants", "rays" or "quantities"
+  std::string name;  ///< of the one to list; empty: all
   bool json = false;
 };
 ExitCode list_command(const ListCommand& command);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "harness/cli/commands.h"
@@ -102,6 +103,18 @@ ExitCode list_command(const ListCommand& command) {
   if (command.what == "rays") list = component_list(ComponentKind::ray_set);
   if (command.what == "quantities")
     for (const auto& [quantity, summary] : kSummaries) list.push_back({{"name", to_string(quantity)}, {"summary", summary}});
+  if (!command.name.empty()) {
+    std::vector<std::string> names;
+    for (const Json& entry : list) names.push_back(plain(entry["name"]));
+    const auto at = std::find(names.begin(), names.end(), command.name);
+    if (at == names.end()) {
+      const std::string near = nearest(command.name, names);
+      throw InputError(fmt::format(
+          "list {}: found \"{}\"; {}", command.what, command.name,
+          near.empty() ? fmt::format("`list {}` shows all of them", command.what) : fmt::format("did you mean \"{}\"?", near)));
+    }
+    list = Json::array({list[static_cast<std::size_t>(at - names.begin())]});
+  }
   if (command.json)
     fmt::print("{}\n", list.dump(2));
   else

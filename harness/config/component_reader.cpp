@@ -153,8 +153,11 @@ std::vector<Component> read_given(ComponentKind kind, const JsonNode& node, cons
     const auto parameter = std::find_if(parameters.begin(), parameters.end(), named);
     if (parameter == parameters.end()) {
       if (kind == ComponentKind::medium && key == "optical_depth") tell_of_extinction(node[key], first.type, parameters);
-      if (key.rfind("x-", 0) != 0 && std::find(keys.begin(), keys.end(), key) == keys.end())
+      if (key.rfind("x-", 0) != 0 && std::find(keys.begin(), keys.end(), key) == keys.end()) {
+        if (parameters.empty() && nearest(key, keys).empty())
+          node[key].fail(fmt::format("unknown parameter \"{}\"; {} has no parameters", key, first.type));
         node[key].unknown(fmt::format("parameter of {}", first.type), key, keys);
+      }
       continue;
     }
     std::vector<ParameterValue> values;

@@ -179,6 +179,8 @@ TEST(Config, ErrorsAreOneLineWithPlaceAndRemedy) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {matrix(R"(["ratio","ratoi"])", R"("linear")"),
        R"(t.json: /experiments/0/matrix/estimator/1: unknown estimator "ratoi"; did you mean "ratio"?)"},
+      {matrix(R"({"type":"ratio","control":"average"})", R"("linear")"),
+       R"(t.json: /experiments/0/matrix/estimator/control: unknown parameter "control"; ratio has no parameters)"},
       {matrix(R"({"type":"residual_ratio","contrl":"average"})", R"("linear")"),
        R"(t.json: /experiments/0/matrix/estimator/contrl: unknown parameter of residual_ratio "contrl"; did you mean "control"?)"},
       {matrix(R"("ratio")", R"({"type":"fractal_noise","optical_depth":2})"),

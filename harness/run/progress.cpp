@@ -15,7 +15,7 @@ namespace nullmark {
 
 namespace {
 
-constexpr auto kRedraw = std::chrono::milliseconds(100);
+constexpr auto kRedraw = std::chrono::milliseconds(100), kSilence = std::chrono::milliseconds(30'000);
 constexpr int kBar = 24;
 constexpr std::size_t kNameColumns = 44;
 
@@ -37,7 +37,11 @@ Progress::Progress(std::size_t total, Lines lines)
 Progress::~Progress() { clear(); }
 
 void Progress::cell_progress(const CellRecord& record, double fraction) {
-  draw(static_cast<double>(done_) + fraction, record.cell.name);
+  if (terminal_) return draw(static_cast<double>(done_) + fraction, record.cell.name);
+  const Clock::time_point now = Clock::now();
+  if (!lines_ || now - last_told_ < kSilence) return;
+  last_told_ = now;
+  notice("[{}/{}] {}: {:.0f} % sampled\n", done_, total_, record.cell.name, 100 * fraction);
 }
 
 void Progress::cell_done(const CellRecord& record, std::size_t done, std::size_t total) {
@@ -48,6 +52,7 @@ void Progress::cell_done(const CellRecord& record, std::size_t done, std::size_t
     return;
   }
   if (!lines_) return;
+  last_told_ = Clock::now();
   notice("[{}/{}] {}: {}{}\n", done, total, record.cell.name, to_string(record.status),
          record.reason.empty() ? "" : " (" + record.reason + ")");
 }
@@ -71,7 +76,7 @@ void Progress::warning(const std::string& message) {
 
 void Progress::draw(double done, const std::string& doing) {
   const Clock::time_point now = Clock::now();
-  if (!terminal_ || (drawn_ && now - last_drawn_ < kRedraw)) return;
+  if (drawn_ && now - last_drawn_ < kRedraw) return;
   last_drawn_ = now;
   drawn_ = true;
   const double fraction = total_ == 0 ? 1 : std::clamp(done / static_cast<double>(total_), 0., 1.);

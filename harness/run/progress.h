@@ -8,8 +8,8 @@
 
 namespace nullmark {
 
-/// Shows the progress of a run on stderr: a bar on a terminal (coloured unless NO_COLOR is set), otherwise one line per cell, or
-/// nothing.
+/// Shows the progress of a run on stderr: a bar on a terminal (coloured unless NO_COLOR is set), otherwise one line per cell and one
+/// after 30 s of silence, or nothing.
 class Progress {
  public:
   enum class Lines { each_cell, none };
@@ -32,7 +32,7 @@ class Progress {
 
   std::size_t total_, done_ = 0, timed_ = 0;
   bool terminal_, lines_, colour_, drawn_ = false;
-  Clock::time_point start_ = Clock::now(), last_drawn_{};
+  Clock::time_point start_ = Clock::now(), last_told_ = start_, last_drawn_{};
 };
 
 }  // namespace nullmark
