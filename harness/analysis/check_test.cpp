@@ -299,7 +299,7 @@ TEST_F(Nothing, ADisabledVerdictIsSkippedWithTheReason) {
   EXPECT_NE(read("j.xml").find("nothing claimed: the configuration disables the verdict"), std::string::npos) << read("j.xml");
 }
 
-/// What needs no look is counted where it is much, and never hides what does.
+/// Many cells that need no look become one line; cells that need one stay listed.
 TEST(CheckText, ManyCellsThatNeedNoLookAreOneLineEach) {
   RunRecord run = example_results();
   CellRecord passed = run.cells[0];

@@ -240,7 +240,7 @@ double sampled_transmittance(const openvdb::FloatGrid& grid, const HardVolume& v
   return std::exp(-static_cast<double>(sum) / kPoints * (to - from).length() * volume.extinction_per_value);
 }
 
-/// Every tracker, under every structure of bounds, through real files.
+/// Five trackers under five structures of bounds, through real files.
 TEST(HardCases, VolumesAtTheirLimits) {
   openvdb::initialize();
   const std::string file = fmt::format("{}nullmark_limits_{}.vdb", ::testing::TempDir(), ::getpid());

@@ -112,44 +112,31 @@ std::string default_output(const std::string& config) {
 std::string percent(double fraction) { return fmt::format("{:.2g} %", 100 * fraction); }
 
 /// What each cell would cost and how small a bias its samples would show.
-ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected) {
-  // Stands for a machine that has not been measured yet.
-  constexpr double kNsPerLookup = 5;
+ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected, bool timing) {
   // A pooled bias of five standard errors is hardly chance, whatever the number of cells.
   constexpr double kStandardErrors = 5;
-  const std::vector<Prediction> predictions = predict(plan, selected);
-  std::vector<std::vector<std::string>> lines = {{"cell", "rays", "samples/ray", "lookups/sample", "lookups", "seconds",
-                                                  "bias shown from", "planned/ray", "verdict", "status"}};
-  double total_samples = 0, total_lookups = 0, lookups_to_decide = 0;
-  bool all_known = true, any = false;
-  for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i) {
-    if (!selected[i]) continue;
-    const Prediction& prediction = predictions[next++];
-    const double samples = static_cast<double>(prediction.rays) * static_cast<double>(prediction.samples_per_ray);
-    std::optional<double> lookups, shown;
-    if (prediction.lookups_per_sample) lookups = samples * *prediction.lookups_per_sample;
-    if (prediction.relative_variance && samples > 0) shown = kStandardErrors * std::sqrt(*prediction.relative_variance / samples);
-    lines.push_back({plan.cells[i].name, fmt::to_string(prediction.rays), fmt::to_string(prediction.samples_per_ray),
-                     short_number(prediction.lookups_per_sample), short_number(lookups),
-                     short_number(lookups ? std::optional(*lookups * kNsPerLookup * 1e-9) : std::nullopt),
-                     shown ? percent(*shown) : "-", short_number(static_cast<Real>(prediction.planned)), prediction.verdict,
-                     prediction.status});
+  const Forecast run = forecast(plan, selected);
+  std::vector<std::vector<std::string>> lines = {
+      {"cell", "rays", "samples/ray", "lookups/sample", "CPU seconds", "bias shown from", "planned/ray", "verdict", "status"}};
+  double samples = 0, seconds = 0;
+  bool any = false;
+  for (const Prediction& prediction : run.cells) {
+    const double drawn = static_cast<double>(prediction.rays) * static_cast<double>(prediction.samples_per_ray);
+    std::optional<double> shown;
+    if (prediction.relative_variance && drawn > 0) shown = kStandardErrors * std::sqrt(*prediction.relative_variance / drawn);
+    lines.push_back({plan.cells[prediction.cell].name, fmt::to_string(prediction.rays),
+                     fmt::to_string(prediction.samples_per_ray), short_number(prediction.lookups_per_sample),
+                     fmt::format("{:.2g}", prediction.seconds), shown ? percent(*shown) : "-",
+                     short_number(static_cast<Real>(prediction.planned)), prediction.verdict, prediction.status});
     if (prediction.status != "ok") continue;
     any = true;
-    total_samples += samples;
-    total_lookups += lookups.value_or(0);
-    if (prediction.verdict == "PASS")
-      lookups_to_decide += lookups.value_or(0) * std::max(1., static_cast<double>(prediction.planned) /
-                                                                  static_cast<double>(prediction.samples_per_ray));
-    else
-      lookups_to_decide += lookups.value_or(0);
-    all_known &= lookups.has_value();
+    samples += drawn;
+    seconds += prediction.seconds;
   }
-  tell(
-      "{}\n{} cells, {:.4g} samples, {}{:.4g} lookups, about {:.3g} s of one core at {} ns per lookup, without timing; about "
-      "{:.4g} lookups including further samples of verdicts\n",
-      aligned(lines, 1), lines.size() - 1, total_samples, all_known ? "" : "at least ", total_lookups,
-      total_lookups * kNsPerLookup * 1e-9, kNsPerLookup, lookups_to_decide);
+  tell("{}\n", aligned(lines, 1));
+  if (run.cells.size() < run.selected) tell("{} of the cells stand for all; ", run.cells.size());
+  tell("{} cells: about {:.3g} samples before those that verdicts add, {:.3g} s of CPU{}\n", run.selected, samples * run.weight(),
+       seconds * run.weight(), timing && plan.timing.enabled ? fmt::format(" and {:.3g} s of timing", run.timing_seconds) : "");
   if (any) return ExitCode::ok;
   notice("nullmark: nothing would run: all cells are skipped\n");
   return ExitCode::nothing_ran;
@@ -296,7 +283,7 @@ ExitCode run_command(const RunCommand& command) {
   }
   if (seed) warn_of_own_seeds(plan, *seed);
   expect_threads(command.threads);
-  if (command.dry_run) return dry_run(plan, selected);
+  if (command.dry_run) return dry_run(plan, selected, !command.no_timing);
 
   const bool to_stdout = command.output == "-";
   const std::string output = command.output.empty() ? default_output(command.configs.front()) : command.output;

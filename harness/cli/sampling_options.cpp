@@ -32,7 +32,8 @@ void declare_run(CLI::App& command, RunCommand& asked) {
   command.add_flag("--resume", asked.resume, "Continue from the existing results and journal");
   command.add_option("--builds", asked.builds, kBuilds)->needs("--resume");
   command.add_flag("--force", asked.force, "Replace existing results")->excludes("--resume");
-  command.add_flag("--dry-run", asked.dry_run, "Print cells, predicted samples, lookups and time; draw no samples");
+  command.add_flag("--dry-run", asked.dry_run,
+                   "Print cells, predicted samples, lookups and time; draw only a few samples, to see what they cost");
   command.add_option("--time-budget", asked.time_budget, "End sampling and timing after this many seconds")
       ->check(CLI::Validator(
           [](const std::string& text) {

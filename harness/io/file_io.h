@@ -34,7 +34,7 @@ void write_all(int file, std::string_view text, const std::string& path);
 /// Puts on disk what was written to an open file.  Throws InputError.
 void make_durable(int file, const std::string& path);
 
-/// Puts on disk that the path's folder holds its name: a new or renamed file survives a power cut only then.
+/// Syncs the folder of the path: only then does a new or renamed file survive a power cut.  Errors are ignored.
 void make_name_durable(const std::string& path);
 
 }  // namespace nullmark

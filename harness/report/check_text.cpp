@@ -103,14 +103,22 @@ bool is_listed(const CellRecord& record) {
   return kind != Kind::unclaimed && (kind != Kind::pass || !marks_of(record).empty());
 }
 
-/// Whether somebody should look at a cell of the kind.
-bool needs_attention(Kind kind) { return kind == Kind::fail || kind == Kind::error || kind == Kind::unexpected_open; }
+/// Whether somebody should look at a cell of the kind: always, and where every claim must be decided.
+bool needs_attention(Kind kind, bool strict) {
+  if (kind == Kind::fail || kind == Kind::error || kind == Kind::unexpected_open) return true;
+  return strict && (kind == Kind::expected_open || kind == Kind::violated || kind == Kind::not_run);
+}
 
 /// Verdict and marks, without the numbers of the cell.
 std::string word_of_group(const CellRecord& record) {
   std::vector<std::string> marks;
-  for (const Mark mark : marks_of(record)) marks.emplace_back(mark_name(mark));
+  for (const Mark mark : marks_of(record)) marks.emplace_back(mark == Mark::law ? mark_text(mark, record) : mark_name(mark));
   return with_marks(verdict_word(kind_of(record)), marks);
+}
+
+/// Why a cell was not run; the word alone does not tell.
+std::string reason_of_group(const CellRecord& record) {
+  return kind_of(record) == Kind::not_run ? fmt::format(" ({})", finding_of(record)) : "";
 }
 
 std::string cell_line(const CellRecord& record) {
@@ -135,11 +143,11 @@ std::string group_line(const std::string& word, const std::vector<const CellReco
 }
 
 /// The cells that nobody need look at one by one, where they are many: a line for each word.
-std::string grouped_lines(const RunRecord& run) {
+std::string grouped_lines(const RunRecord& run, bool strict) {
   std::map<std::pair<Kind, std::string>, std::vector<const CellRecord*>> groups;
   for (const CellRecord& record : run.cells)
-    if (is_listed(record) && !needs_attention(kind_of(record)))
-      groups[{kind_of(record), word_of_group(record)}].push_back(&record);
+    if (is_listed(record) && !needs_attention(kind_of(record), strict))
+      groups[{kind_of(record), word_of_group(record) + reason_of_group(record)}].push_back(&record);
   std::string text;
   for (const auto& [key, cells] : groups) text += cells.size() == 1 ? cell_line(*cells[0]) : group_line(key.second, cells);
   return text + "`nullmark check --all` lists each of them\n";
@@ -149,15 +157,16 @@ std::string grouped_lines(const RunRecord& run) {
 
 std::string summary_text(const RunRecord& run, const Summary& summary, bool all) {
   constexpr std::ptrdiff_t kFew = 40;
-  const auto quiet = std::count_if(run.cells.begin(), run.cells.end(), [](const CellRecord& record) {
-    return is_listed(record) && !needs_attention(kind_of(record));
+  const auto quiet = std::count_if(run.cells.begin(), run.cells.end(), [&](const CellRecord& record) {
+    return is_listed(record) && !needs_attention(kind_of(record), summary.strict);
   });
   const bool grouped = !all && quiet > kFew;
-  std::string text = grouped ? grouped_lines(run) : "";
+  std::string text = grouped ? grouped_lines(run, summary.strict) : "";
   for (const Kind kind :
        {Kind::pass, Kind::violated, Kind::expected_open, Kind::not_run, Kind::unexpected_open, Kind::error, Kind::fail})
     for (const CellRecord& record : run.cells)
-      if (kind_of(record) == kind && is_listed(record) && (!grouped || needs_attention(kind))) text += cell_line(record);
+      if (kind_of(record) == kind && is_listed(record) && (!grouped || needs_attention(kind, summary.strict)))
+        text += cell_line(record);
   for (const OrderFit& fit : summary.orders) text += fmt::format("ORDER: {}\n", order_line(fit));
   if (!summary.findings.empty()) text += findings_text(summary.findings);
   for (const std::string& line : remarks_of(run, summary)) text += line + "\n";

@@ -24,4 +24,6 @@ async function boot() {
   unpackedData = data;
   scripts.forEach(runScript);
 }
-boot();
+boot().catch((error) => {
+  document.getElementById("content").textContent = `This page is damaged: ${error.message}`;
+});

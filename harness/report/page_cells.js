@@ -71,7 +71,11 @@ function compareBy(column, descending) {
 }
 
 /** The table of every cell keeps its choices here. */
-const cellTable = { column: null, descending: false, page: 0, outcome: "", words: "", allRows: false };
+const cellTable = { column: null, descending: false, page: 0, outcome: "", words: "", field: null, allRows: false };
+
+function isOfField(cell, field) {
+  return field === null || (cell.type === field.tracker && mediumType(cell) === field.medium);
+}
 
 function searchText(cell) {
   return `${cell.name} ${cell.label} ${cell.quantity} ${cell.light} ${cell.marked_word} ${verdictReason(cell)}`.toLowerCase();
@@ -79,7 +83,7 @@ function searchText(cell) {
 
 function chosenCells() {
   const words = cellTable.words.toLowerCase().split(/\s+/);
-  const chosen = passingCells().filter((cell) =>
+  const chosen = passingCells().filter((cell) => isOfField(cell, cellTable.field) &&
     (cellTable.outcome === "" || outcomeOf(cell) === cellTable.outcome) && words.every((word) => searchText(cell).includes(word)));
   return cellTable.column ? chosen.sort(compareBy(cellTable.column, cellTable.descending)) : chosen;
 }
@@ -98,28 +102,26 @@ function sortedWord(column) {
   return cellTable.descending ? "descending" : "ascending";
 }
 
-/** Have the table of every cell show those of an outcome, or with some words in their names; set once the table is there. */
+/** Have the table of every cell show those of an outcome, or of a field of the matrix, and no others; set once the table is there. */
 let chooseOutcome = () => {};
-let searchCells = () => {};
+let chooseField = () => {};
 
 function cellTableControls(update) {
-  const change = (key) => (value) => {
-    cellTable[key] = value;
-    cellTable.page = 0;
+  const outcomes = [...new Set(report.cells.map(outcomeOf))].sort();
+  const change = (chosen) => {
+    Object.assign(cellTable, chosen, { page: 0 });
+    choice.select.value = cellTable.outcome;
+    search.value = cellTable.words;
+    field.hidden = cellTable.field === null;
+    field.textContent = cellTable.field === null ? "" : `Only ${cellTable.field.tracker} on ${cellTable.field.medium}: show all`;
     update();
   };
-  const outcomes = [...new Set(report.cells.map(outcomeOf))].sort();
-  const choice = selectOf("Verdict", [["", "all"], ...outcomes.map((word) => [word, word])], change("outcome"));
-  chooseOutcome = (word) => {
-    choice.select.value = outcomes.includes(word) ? word : "";
-    change("outcome")(choice.select.value);
-  };
-  const search = element("input", { type: "search", id: "search", oninput: () => change("words")(search.value) });
-  searchCells = (words) => {
-    search.value = words;
-    change("words")(words);
-  };
-  return element("div", { className: "controls" }, choice.label, element("label", { className: "choice" }, "Words in the name ", search));
+  const choice = selectOf("Verdict", [["", "all"], ...outcomes.map((word) => [word, word])], (outcome) => change({ outcome }));
+  const search = element("input", { type: "search", id: "search", oninput: () => change({ words: search.value }) });
+  const field = button("", () => change({ field: null }), { hidden: true });
+  chooseOutcome = (word) => change({ outcome: outcomes.includes(word) ? word : "", words: "", field: null });
+  chooseField = (chosen) => change({ outcome: "", words: "", field: chosen });
+  return element("div", { className: "controls" }, choice.label, element("label", { className: "choice" }, "Words in the name ", search), field);
 }
 
 function buildVerdicts(body) {

@@ -44,6 +44,7 @@ function paperFigures() {
   const withImages = firstScenes(hasImages);
   const matrix = usefulMatrixViews().slice(0, 1).map(([, view]) => ({ name: "matrix", describe: matrixFigure(view).describe }));
   return [
+    ...firstScenes(reachesTheError).map((scene) => ({ name: `time-to-error ${scene.experiment}`, describe: timesFigure(scene).describe })),
     ...convergencePaper(),
     ...firstScenes(hasParetoPoint).map((scene) => ({ name: `pareto ${scene.experiment}`, describe: paretoFigure(scene).describe })),
     ...matrix,

@@ -75,6 +75,13 @@ function shortened(text, length) {
   return text.length <= length ? text : `${text.slice(0, length - 1)}…`;
 }
 
+/** The same of names that differ at their ends. */
+function shortenedInside(text, length) {
+  if (text.length <= length) return text;
+  const end = Math.ceil(0.6 * (length - 1));
+  return `${text.slice(0, length - 1 - end)}…${text.slice(-end)}`;
+}
+
 /** Text for plotly.js, which reads a subset of HTML. */
 function plotText(text) {
   return String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;");

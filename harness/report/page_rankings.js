@@ -24,7 +24,7 @@ function estimatorCell(scene, entry, cell) {
   return element("span", {}, markedLabel(entry.label), baseline, claimTag(cell) ?? "");
 }
 
-/** Columns of a ranking; those of times are left out where nothing was timed. */
+/** Columns of a ranking; those of times are left out where nothing was timed, and those without content. */
 const rankingColumns = [
   { title: "rank", timed: true, of: (_, entry) => rankText(entry) },
   { title: "estimator", of: estimatorCell },
@@ -40,10 +40,21 @@ const rankingColumns = [
   { title: "cheaper than the best unbiased until", timed: true, of: (scene, entry) => breakEvenText(scene, entry.cell) },
 ].filter(({ timed }) => anythingTimed || !timed);
 
-function rankingRow(scene, entry) {
-  const row = tableRow(rankingColumns.map(({ of }) => of(scene, entry, report.cells[entry.cell])));
-  row.dataset.ranked = String(entry.cell);
-  return row;
+function hasContent(shown) {
+  const text = shown instanceof Node ? shown.textContent : shown;
+  return text !== "" && text !== unknown;
+}
+
+/** Rows of the table, without columns that are empty in all rows. */
+function rankingRows(scene, entries) {
+  const rows = entries.map((entry) => rankingColumns.map(({ of }) => of(scene, entry, report.cells[entry.cell])));
+  const kept = rankingColumns.map((_, column) => column).filter((column) => rows.some((row) => hasContent(row[column])));
+  const made = rows.map((row, place) => {
+    const line = tableRow(kept.map((column) => row[column]));
+    line.dataset.ranked = String(entries[place].cell);
+    return line;
+  });
+  return { titles: kept.map((column) => rankingColumns[column].title), rows: made };
 }
 
 function amortisedNote(entries) {
@@ -76,7 +87,8 @@ function pairedTable(scene) {
 
 function showRanking(panel, scene) {
   const entries = scene.ranking.filter((entry) => passes(report.cells[entry.cell]));
-  const table = element("table", { className: "ranking" }, headRow(rankingColumns.map(({ title }) => title)), element("tbody", {}, ...entries.map((entry) => rankingRow(scene, entry))));
+  const { titles, rows } = rankingRows(scene, entries);
+  const table = element("table", { className: "ranking" }, headRow(titles), element("tbody", {}, ...rows));
   panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), amortisedNote(entries), unprovenNote(scene), pairedTable(scene) ?? ""));
 }
 

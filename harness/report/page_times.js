@@ -24,14 +24,15 @@ function timeTrace(cell, row, theme) {
 function timesPlot(scene, width, theme) {
   const cells = cellsOf(scene).filter(reachesTheError).sort((a, b) => secondsTo(a, 0).value - secondsTo(b, 0).value);
   const rows = cells.map((_, row) => row);
+  const ends = cells.flatMap((cell) => [secondsTo(cell, 0).low, secondsTo(cell, 0).value, secondsTo(cell, 0).high]).filter((x) => isNumber(x) && x > 0);
   const mark = (cell) => outcomeMarks[outcomeOf(cell)] ?? "";
-  const name = (cell) => plotText(`${shortened(cell.label, width < 620 ? 32 : 60)} ${mark(cell)}`);
+  const name = (cell) => plotText(`${shortenedInside(cell.label, width < 620 ? 32 : 60)} ${mark(cell)}`);
   return {
     traces: cells.map((cell, row) => timeTrace(cell, row, theme)),
     layout: {
       ...baseLayout(theme),
       height: 80 + 21 * cells.length,
-      xaxis: logAxis(theme, "seconds a ray until the error is 1\u00a0%", cells.map((cell) => secondsTo(cell, 0).value)),
+      xaxis: logAxis(theme, "seconds a ray until the error is 1\u00a0%", ends),
       yaxis: { ...axis(theme, ""), tickmode: "array", tickvals: rows, ticktext: cells.map(name), range: [cells.length - 0.4, -0.6] },
     },
   };

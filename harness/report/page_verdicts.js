@@ -2,8 +2,9 @@
 
 const manyScenes = 12;
 
+/** "channels" of "channels(cosine/...)". */
 function mediumType(cell) {
-  return cell.medium.split("/")[0];
+  return cell.medium.split(/[/(]/)[0];
 }
 
 /** Lists of cells by what `keyOf` says of each, in the order in which the keys first occur. */
@@ -46,7 +47,7 @@ function fieldOf(tracker, medium, cells, experiments) {
   const bars = experiments.map((name) => (by.has(name) ? shareBar(by.get(name)) : element("span", { className: "share" })));
   return element("a", {
     className: "field", href: "#verdicts", title: [`${tracker} on ${medium}`, ...lines].join("\n"), "aria-label": `${tracker} on ${medium}: ${countsText(cells)}`,
-    onclick: () => searchCells(`${tracker} ${medium}`),
+    onclick: () => chooseField({ tracker, medium }),
   }, ...bars);
 }
 
@@ -55,7 +56,7 @@ function verdictKey(cells) {
     element("span", { className: "key" }, element("span", { className: "share" }, element("span", { className: outcomeClass(word) })), ` ${word}`)));
 }
 
-/** The words that ask for a look, or that all is well. */
+/** PASS count, and counts of words that need attention. */
 function shortCounts(cells) {
   const counts = new Map(wordCounts(cells));
   const told = ["FAIL", "ERROR", "INCONCLUSIVE", "VIOLATED"].filter((word) => counts.has(word));
@@ -77,8 +78,7 @@ function buildVerdictMatrix(body) {
     });
     const table = plainTable(["tracker", "verdicts", ...media.map(({ medium }) => medium)], rows);
     table.classList.add("verdict-matrix");
-    const order = experimentsOf(cells).join(", ");
-    panel.replaceChildren(
-      verdictKey(cells), table, element("p", { className: "says" }, `The bars of a field are the experiments of its medium, from left to right: ${order}.`));
+    const order = media.map(({ medium, experiments }) => element("li", {}, `${medium}: ${experiments.join(", ")}`));
+    panel.replaceChildren(verdictKey(cells), table, details("The bars of a field are experiments, from left to right", element("ul", {}, ...order)));
   };
 }

@@ -71,9 +71,11 @@ void Journal::lock() {
 
 void Journal::read(const std::string& config_hash, Mode mode) {
   const std::string text = read_file(path_);
-  std::size_t complete = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
-  // A power cut may leave zeros of what no sync had put on the disk; of the first line, only before any cell.
-  if (text.substr(0, text.find('\n')).find('\0') != std::string::npos) complete = 0;
+  const std::size_t first_end = text.find('\n');
+  std::size_t complete = first_end == std::string::npos ? 0 : text.rfind('\n') + 1;
+  // After a power cut, unsynced bytes may read as zeros.  A head that is not synced has no lines behind it.
+  const bool torn_head = first_end + 1 == complete && text.find('\0') < first_end && mode == Mode::resume;
+  if (torn_head) complete = 0;
   if (complete == 0 || mode == Mode::overwrite) {
     if (::ftruncate(file_, 0) != 0) throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
     write_head(config_hash);
@@ -97,6 +99,7 @@ void Journal::read(const std::string& config_hash, Mode mode) {
   holds_cells_ = !cells_.empty();
   if (complete < text.size() && ::ftruncate(file_, static_cast<off_t>(complete)) != 0)
     throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
+  make_name_durable(path_);
   // Cells that this run appends are of its own build.
   if (of_lines_.environment != build_.environment || of_lines_.plugin_hash != build_.plugin_hash) write_head(config_hash);
 }

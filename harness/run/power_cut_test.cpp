@@ -3,6 +3,8 @@
 
 #include "harness/testing/power_cut.h"
 
+#include <algorithm>
+
 #include "harness/testing/ended_run.h"
 
 namespace nullmark {
@@ -46,7 +48,7 @@ class PowerCut : public EndedRunTest {
     return read_disk_steps(log, kResults, before);
   }
 
-  /// Cells that the run had settled, each its line: those of a sync, whose file's name must then be there as well.
+  /// Cells that a sync has put on the disk, each its line.  The name of their file must then be there too.
   std::set<std::string> settled(const DiskFiles& before, const std::vector<DiskStep>& steps, std::size_t count) const {
     std::vector<Kept> kept(count, Kept::all);
     for (const std::size_t i : unsynced_steps(steps, count))
@@ -62,7 +64,7 @@ class PowerCut : public EndedRunTest {
     const std::vector<DiskStep> steps = steps_of_run(before, option);
     std::size_t states = 0;
     for (std::size_t count = 0; count <= steps.size(); ++count) {
-      const std::set<std::string> kept = option == "--force" ? std::set<std::string>() : settled(before, steps, count);
+      const std::set<std::string> kept = settled(before, steps, count);
       for (const DiskFiles& state : states_after_cut(before, steps, count)) {
         SCOPED_TRACE(fmt::format("after {} steps, state {}", count, states));
         put(state);
@@ -84,11 +86,12 @@ class PowerCut : public EndedRunTest {
 
 TEST_F(PowerCut, OfARun) { EXPECT_GT(survive_every_cut({}, ""), 30u); }
 
-/// A run that a kill has torn.
+/// The journal of a run that a kill has ended in the middle of a line: a head and at least one cell before it.
 TEST_F(PowerCut, OfAResumedRun) {
   DiskFiles torn;
-  for (int step = 1; torn[Journal::path_for(kResults)].empty() || torn.at(Journal::path_for(kResults)).back() == '\n';
-       ++step) {
+  const std::string journal = Journal::path_for(kResults);
+  const auto lines = [&] { return std::count(torn[journal].begin(), torn[journal].end(), '\n'); };
+  for (int step = 1; lines() < 2 || torn.at(journal).back() == '\n'; ++step) {
     put({});
     ASSERT_EQ(Process(folder_, {"run", "few.json", "-o", kResults}, faulty("tear", step)).wait(), 128 + SIGKILL) << "never torn";
     torn = files();
@@ -96,9 +99,40 @@ TEST_F(PowerCut, OfAResumedRun) {
   EXPECT_GT(survive_every_cut(torn, "--resume"), 15u);
 }
 
+/// A run that was killed between the sync of its journal and that of the folder: the next one owes the name.
+TEST_F(PowerCut, OfARunWhoseJournalHasNoDurableName) {
+  put({});
+  ASSERT_EQ(Process(folder_, {"run", "few.json", "-o", kResults}, faulty("kill", 3)).wait(), 128 + SIGKILL);
+  const DiskFiles begun = files();
+  ASSERT_EQ(begun.at(Journal::path_for(kResults)).back(), '\n');
+  const std::vector<DiskStep> steps = steps_of_run(begun, "--resume");
+  const auto first = [&](const char* what) {
+    return std::find_if(steps.begin(), steps.end(), [&](const DiskStep& step) { return step.what == what; });
+  };
+  EXPECT_LT(first("sync_folder"), first("sync"));
+}
+
+/// Old results with other numbers: after any cut one of the two is there, whole.
 TEST_F(PowerCut, OfARunThatReplaces) {
-  ASSERT_EQ(run(std::string("run few.json -o ") + kResults), 0);
-  EXPECT_GT(survive_every_cut(files(), "--force"), 30u);
+  configure("other.json", 20, "1");
+  ASSERT_EQ(run(std::string("run other.json -o ") + kResults), 0);
+  const DiskFiles before = files();
+  const std::vector<DiskStep> steps = steps_of_run(before, "--force");
+  const std::string after = read(kResults);
+  ASSERT_NE(before.at(kResults), after);
+  std::size_t old_ones = 0, new_ones = 0;
+  for (std::size_t count = 0; count <= steps.size(); ++count)
+    for (const DiskFiles& state : states_after_cut(before, steps, count)) {
+      ASSERT_TRUE(state.count(kResults));
+      old_ones += state.at(kResults) == before.at(kResults);
+      new_ones += state.at(kResults) == after;
+      EXPECT_TRUE(state.at(kResults) == before.at(kResults) || state.at(kResults) == after) << "after " << count << " steps";
+      put(state);
+      EXPECT_EQ(run(std::string("run few.json -o ") + kResults + " --force"), 0) << read("err");
+      EXPECT_EQ(statistics_text(results(kResults)), expected_);
+    }
+  EXPECT_GT(old_ones, 0u);
+  EXPECT_GT(new_ones, 0u);
 }
 
 }  // namespace

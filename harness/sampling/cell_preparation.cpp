@@ -191,7 +191,8 @@ std::shared_ptr<const Scene> CellPreparer::scene(const Cell& cell) {
     const Component& set = plan_.ray_sets[cell.rays];
     const auto rays = once(rays_, std::array{cell.medium, cell.rays, cut}, [&] {
       return located(set.pointer, [&] {
-        return std::make_shared<const BuiltRays>(cut_at(build_surfaces(surfaces, 1), build_rays(set, *medium)));
+        return std::make_shared<const BuiltRays>(
+            thinned(cut_at(build_surfaces(surfaces, 1), build_rays(set, *medium)), most_rays_));
       });
     });
     const auto reference = once(references_, std::array{cell.medium, cell.rays, cut},

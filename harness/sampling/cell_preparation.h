@@ -2,6 +2,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -38,7 +39,9 @@ struct PreparedCell {
 /// Builds media, majorant structures, rays and references on demand, each once.
 class CellPreparer {
  public:
-  explicit CellPreparer(const Plan& plan) : plan_(plan) {}
+  /// Of more than `most_rays` of a cell it takes so many, evenly: for forecasts.
+  explicit CellPreparer(const Plan& plan, std::size_t most_rays = std::numeric_limits<std::size_t>::max())
+      : plan_(plan), most_rays_(most_rays) {}
 
   /// Prepares a cell by its index in the plan, without its theory.  Throws ParameterError (with a JSON pointer as `parameter`)
   /// for specifications that do not fit their medium.  What else a tracker throws is the cell's `failure`.
@@ -56,6 +59,7 @@ class CellPreparer {
   std::shared_ptr<const BuiltMedium> medium(std::size_t index);
 
   const Plan& plan_;
+  std::size_t most_rays_;
   std::map<std::size_t, std::string> missing_;
   std::map<std::size_t, std::shared_ptr<const BuiltMedium>> media_;
   std::map<std::array<std::size_t, 2>, std::shared_ptr<const BuiltMajorant>> structures_;

@@ -129,6 +129,17 @@ BuiltRays build_rays(const Component& spec, const BuiltMedium& medium) {
   return built;
 }
 
+BuiltRays thinned(BuiltRays rays, std::size_t most) {
+  const std::size_t all = rays.world.size();
+  if (all <= most) return rays;
+  BuiltRays some;
+  for (std::size_t i = 0; i < most; ++i) {
+    some.world.push_back(rays.world[i * all / most]);
+    some.local.push_back(rays.local[i * all / most]);
+  }
+  return some;
+}
+
 namespace {
 
 constexpr Real kEpsilon = std::numeric_limits<Real>::epsilon();

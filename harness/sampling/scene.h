@@ -47,6 +47,9 @@ struct BuiltRays {
 };
 BuiltRays build_rays(const Component& spec, const BuiltMedium& medium);
 
+/// At most so many of the rays, evenly, and no picture then.
+BuiltRays thinned(BuiltRays rays, std::size_t most);
+
 /// Optical depth of every ray, per channel, with a bound on its error.
 struct Reference {
   int channels = 1;

@@ -134,7 +134,7 @@ int fsync(int file) {
   const auto lock = in_order();
   if (watched(file) && torn()) die();
   const int result = real(file);
-  if (struct stat status; lock && watched(file) && ::fstat(file, &status) == 0)
+  if (struct stat status; result == 0 && lock && watched(file) && ::fstat(file, &status) == 0)
     tell(S_ISDIR(status.st_mode) ? "sync_folder" : "sync " + name_of(path_of(file)));
   return result;
 }

@@ -8,8 +8,8 @@
 
 namespace nullmark {
 
-/// A tracker on a ray along x from the origin, for tests that look at single walks and their events.  They may give other random
-/// numbers.
+/// A tracker on a ray along x from the origin, for tests that look at single walks and their events.  Tests may supply their own
+/// random numbers.
 template <template <class> class Estimator, class Value = Real>
 class HandWalked {
  public:

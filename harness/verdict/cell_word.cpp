@@ -20,15 +20,6 @@ bool takes_variance(const VerdictRecord& verdict) {
                      [](const TestRecord& test) { return test.channel >= 0 && test.basis.find("catoni") != std::string::npos; });
 }
 
-std::string mark_text(Mark mark, const CellRecord& record) {
-  if (mark == Mark::part_of_depth) return fmt::format("leans on the exact depth ({:.2g} of its answer)", *record.reliance);
-  if (mark != Mark::law) return mark_name(mark);
-  // "replay: why" is the law and why it is not tested.
-  std::vector<std::string> laws;
-  for (const std::string& law : record.verdict->untested) laws.push_back(law.substr(0, law.find(':')));
-  return fmt::format("{} not tested", fmt::join(laws, " and "));
-}
-
 std::string violations_of(const CellRecord& record) {
   const std::string largest =
       record.largest_violation ? fmt::format(", the largest {:.3g} times it", *record.largest_violation) : "";
@@ -119,6 +110,17 @@ const char* mark_name(Mark mark) {
       break;
   }
   return "law not tested";
+}
+
+std::string mark_text(Mark mark, const CellRecord& record) {
+  if (mark == Mark::part_of_depth) return fmt::format("leans on the exact depth ({:.2g} of its answer)", *record.reliance);
+  if (mark != Mark::law) return mark_name(mark);
+  // "replay: why" is the law and why it is not tested.
+  std::vector<std::string> laws;
+  for (const std::string& text : record.verdict->untested)
+    if (std::string law = text.substr(0, text.find(':')); std::find(laws.begin(), laws.end(), law) == laws.end())
+      laws.push_back(std::move(law));
+  return fmt::format("{} not tested", fmt::join(laws, " and "));
 }
 
 std::vector<std::string> mark_texts(const CellRecord& record) {

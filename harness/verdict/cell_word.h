@@ -31,6 +31,9 @@ std::vector<Mark> marks_of(const CellRecord& record);
 /// The name of a mark, as in totals: "by pilot".
 const char* mark_name(Mark mark);
 
+/// What a mark says of the cell: "replay not tested", with numbers where it has some.
+std::string mark_text(Mark mark, const CellRecord& record);
+
 /// The marks of a cell, with figures: "leans on the exact depth (0.25 of its answer)".
 std::vector<std::string> mark_texts(const CellRecord& record);
 

@@ -137,10 +137,11 @@ class ContentsTest(PageTest):
             self.assertRegex(text, rf"^{passed} of {len(own)} PASS")
             self.assertEqual(fields, len({cell["medium"]["type"] for cell in own}))
         self.assertEqual(len({row[0] for row in rows}), len({cell["estimator"]["type"] for cell in CELLS}))
-        field = self.find("#outcomes .field")
+        field = self.find("#outcomes .field[aria-label^='ratio on ']")
         self.js("arguments[0].click()", field)
-        tracker, medium = field.get_attribute("aria-label").split(":")[0].split(" on ")
-        named = sum(tracker in cell["name"] and medium in cell["name"] for cell in CELLS)
-        self.assertIn(f"of {named}", self.find("#shown").text)
-        self.js("searchCells('')")
+        medium = field.get_attribute("aria-label").split(":")[0].split(" on ")[1]
+        own = sum(cell["estimator"]["type"] == "ratio" and cell["medium"]["type"] == medium for cell in CELLS)
+        self.assertRegex(self.find("#shown").text, rf"of {own}$")
+        self.js("chooseOutcome('')")
+        self.assertRegex(self.find("#shown").text, rf"of {len(CELLS)}$")
         self.detail = f"{len(rows)} trackers"
