@@ -51,4 +51,10 @@ std::string unpacked(std::string_view text) {
   return result;
 }
 
+std::string data_of_page(std::string_view page) {
+  constexpr std::string_view kOpen = "<script type=\"text/plain\" id=\"data\">";
+  const std::size_t begin = page.find(kOpen) + kOpen.size();
+  return unpacked(page.substr(begin, page.find("</script>", begin) - begin));
+}
+
 }  // namespace nullmark

@@ -16,4 +16,7 @@ std::string packed(const std::string& text);
 /// What was packed.
 std::string unpacked(std::string_view text);
 
+/// The data of a page, JSON.
+std::string data_of_page(std::string_view page);
+
 }  // namespace nullmark

@@ -98,9 +98,7 @@ TEST(Report, ThePageNeedsNothingBesideItAndNoNameBreaksOut) {
   for (const char* outside : {"<script src", "<link", "@import", "<img src=\"http"})
     EXPECT_EQ(page.find(outside), std::string::npos);
   // The data come back as they went in.
-  const std::string_view open = "<script type=\"text/plain\" id=\"data\">";
-  const std::size_t begin = page.find(open) + open.size(), end = page.find("</script>", begin);
-  EXPECT_EQ(Json::parse(unpacked(std::string_view(page).substr(begin, end - begin)))["runs"][0]["name"], run.name);
+  EXPECT_EQ(Json::parse(data_of_page(page))["runs"][0]["name"], run.name);
 }
 
 std::vector<std::uint16_t> numbers_of(const std::string& text) {

@@ -6,6 +6,7 @@
 #include "harness/model/exit_code.h"
 #include "harness/run/journal.h"
 #include "harness/run/merge.h"
+#include "harness/report/packing.h"
 #include "harness/testing/program.h"
 #include "harness/testing/record_examples.h"
 
@@ -219,7 +220,7 @@ TEST_F(BuildFiles, APlugInStatesItself) {
   EXPECT_NE(error.find("the plug-in faulty 7"), std::string::npos) << error;
   EXPECT_EQ(run("run c.json -o r.json --resume", NULLMARK_FAULTY_PROGRAM), 0) << read("err");
   ASSERT_EQ(run("report r.json -o page.html", NULLMARK_FAULTY_PROGRAM), 0) << read("err");
-  EXPECT_NE(read("page.html").find("nullmark_faulty check r.json"), std::string::npos);
+  EXPECT_NE(data_of_page(read("page.html")).find("nullmark_faulty check r.json"), std::string::npos);
 }
 
 }  // namespace
