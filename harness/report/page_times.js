@@ -26,7 +26,8 @@ function timesPlot(scene, width, theme) {
   const rows = cells.map((_, row) => row);
   const ends = cells.flatMap((cell) => [secondsTo(cell, 0).low, secondsTo(cell, 0).value, secondsTo(cell, 0).high]).filter((x) => isNumber(x) && x > 0);
   const mark = (cell) => outcomeMarks[outcomeOf(cell)] ?? "";
-  const name = (cell) => plotText(`${shortenedInside(cell.label, width < 620 ? 32 : 60)} ${mark(cell)}`);
+  const claim = (cell) => (claimTag(cell) === null ? "" : ` (${cell.claims})`);
+  const name = (cell) => plotText(`${shortenedInside(cell.label, width < 620 ? 32 : 60)}${claim(cell)}${unprovenMark(secondsTo(cell, 0))} ${mark(cell)}`);
   return {
     traces: cells.map((cell, row) => timeTrace(cell, row, theme)),
     layout: {
@@ -42,7 +43,7 @@ function timesCaption(scene) {
   const never = cellsOf(scene).filter((cell) => secondsTo(cell, 0)?.reached === false && hasCostAndTime(cell));
   const words = [...new Set(cellsOf(scene).filter(reachesTheError).map(outcomeOf))];
   return [
-    `${words.map((word) => `${outcomeMarks[word] ?? ""} ${word}`.trim()).join(", ")}.`,
+    `${words.map((word) => `${outcomeMarks[word] ?? ""} ${word}: ${outcomeMeaning(word)}`.trim()).join("; ")}.`,
     never.length > 0 ? `Never, because of a bias that no number of samples removes: ${listed(never.map(labelWithFloor))}.` : "",
     unprovenHint(cellsOf(scene).map((cell) => secondsTo(cell, 0))),
   ].filter(Boolean).join(" ");

@@ -70,13 +70,14 @@ function buildVerdictMatrix(body) {
   return () => {
     const cells = passingCells();
     const experimentsOf = (some) => [...groupedBy(some, ({ experiment }) => experiment).keys()];
-    const media = [...groupedBy(cells, mediumType)].map(([medium, own]) => ({ medium, experiments: experimentsOf(own) }));
+    const media = [...groupedBy(cells, mediumType)].map(([medium, own]) => ({ medium, own, experiments: experimentsOf(own) }));
     const rows = [...groupedBy(cells, ({ type }) => type)].sort(([a], [b]) => (a < b ? -1 : 1)).map(([tracker, own]) => {
       const on = groupedBy(own, mediumType);
       const fields = media.map(({ medium, experiments }) => fieldOf(tracker, medium, on.get(medium) ?? [], experiments));
       return [element("th", { scope: "row" }, tracker), shortCounts(own), ...fields];
     });
-    const table = plainTable(["tracker", "verdicts", ...media.map(({ medium }) => medium)], rows);
+    const heads = media.map(({ medium, own }) => element("span", {}, medium, element("small", { className: "aside" }, shortCounts(own))));
+    const table = plainTable(["tracker", "verdicts", ...heads], rows);
     table.classList.add("verdict-matrix");
     const order = media.map(({ medium, experiments }) => element("li", {}, `${medium}: ${experiments.join(", ")}`));
     panel.replaceChildren(verdictKey(cells), table, details("The bars of a field are experiments, from left to right", element("ul", {}, ...order)));
