@@ -40,21 +40,4 @@ std::string packed(const std::string& text) {
   return base64(bytes);
 }
 
-std::string unpacked(std::string_view text) {
-  namespace io = boost::iostreams;
-  const std::string bytes = from_base64(text);
-  std::string result;
-  io::filtering_istream stream;
-  stream.push(io::gzip_decompressor());
-  stream.push(io::array_source(bytes.data(), bytes.size()));
-  io::copy(stream, io::back_inserter(result));
-  return result;
-}
-
-std::string data_of_page(std::string_view page) {
-  constexpr std::string_view kOpen = "<script type=\"text/plain\" id=\"data\">";
-  const std::size_t begin = page.find(kOpen) + kOpen.size();
-  return unpacked(page.substr(begin, page.find("</script>", begin) - begin));
-}
-
 }  // namespace nullmark

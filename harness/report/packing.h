@@ -13,10 +13,4 @@ std::string from_base64(std::string_view text);
 /// gzip in base64, as the page unpacks it.
 std::string packed(const std::string& text);
 
-/// What was packed.
-std::string unpacked(std::string_view text);
-
-/// The data of a page, JSON.
-std::string data_of_page(std::string_view page);
-
 }  // namespace nullmark

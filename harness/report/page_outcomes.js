@@ -35,9 +35,13 @@ function marksText(cells) {
   return counts.size === 0 ? "" : element("small", {}, `(${[...counts].map(([mark, count]) => `${count} ${mark}`).join(", ")}) `);
 }
 
+/** The cells of each word that occurs: [["PASS", [...]], ...]. */
+function cellsByWord(cells) {
+  return verdictWords.map((word) => [word, cells.filter((cell) => outcomeOf(cell) === word)]).filter(([, of]) => of.length > 0);
+}
+
 function verdictTotals() {
-  const cells = verdictWords.map((word) => [word, report.cells.filter((cell) => outcomeOf(cell) === word)]);
-  const badges = cells.filter(([, of]) => of.length > 0).flatMap(([word, of]) =>
+  const badges = cellsByWord(report.cells).flatMap(([word, of]) =>
     [outcomeBadge(`${of.length} ${word}`, word, { href: "#verdicts", title: outcomeMeaning(word), onclick: () => chooseOutcome(word) }), marksText(of)]);
   return element("p", { className: "totals" }, ...badges);
 }

@@ -20,7 +20,7 @@ function groupedBy(cells, keyOf) {
 
 /** How many cells have each word: [["PASS", 3], ...]. */
 function wordCounts(cells) {
-  return verdictWords.map((word) => [word, cells.filter((cell) => outcomeOf(cell) === word).length]).filter(([, count]) => count > 0);
+  return cellsByWord(cells).map(([word, of]) => [word, of.length]);
 }
 
 function countsText(cells) {

@@ -7,6 +7,7 @@
 #include "harness/report/packing.h"
 #include "harness/report/page.h"
 #include "harness/run/image.h"
+#include "harness/testing/page_data.h"
 #include "harness/testing/program.h"
 #include "harness/testing/record_examples.h"
 #include "harness/testing/verdict_examples.h"

@@ -6,7 +6,7 @@
 #include "harness/model/exit_code.h"
 #include "harness/run/journal.h"
 #include "harness/run/merge.h"
-#include "harness/report/packing.h"
+#include "harness/testing/page_data.h"
 #include "harness/testing/program.h"
 #include "harness/testing/record_examples.h"
 

@@ -37,6 +37,8 @@ Journal::Journal(const std::string& results_path, const std::string& config_hash
   try {
     remove_leftovers(results_path);
     read(config_hash, mode);
+    // Also the name of a journal that a killed run left: a sync of the file does not keep it.
+    make_name_durable(path_);
   } catch (...) {
     ::close(file_);
     throw;
@@ -99,7 +101,6 @@ void Journal::read(const std::string& config_hash, Mode mode) {
   holds_cells_ = !cells_.empty();
   if (complete < text.size() && ::ftruncate(file_, static_cast<off_t>(complete)) != 0)
     throw InputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
-  make_name_durable(path_);
   // Cells that this run appends are of its own build.
   if (of_lines_.environment != build_.environment || of_lines_.plugin_hash != build_.plugin_hash) write_head(config_hash);
 }
@@ -143,7 +144,6 @@ void Journal::write_head(const std::string& config_hash) {
       {kHead, kJournalSchema}, {kVersionKey, RunRecord::kVersion}, {"config_hash", config_hash}, {"build", build_json(build_)}};
   write_all(file_, head.dump() + "\n", path_);
   make_durable(file_, path_);
-  make_name_durable(path_);
 }
 
 void Journal::append(const CellRecord& record) {

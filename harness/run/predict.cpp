@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "harness/registry/components.h"
+#include "harness/run/cpu_clock.h"
 #include "harness/sampling/test_families.h"
 #include "harness/verdict/judge.h"
 #include "harness/verdict/walk_laws.h"
@@ -13,12 +13,6 @@ namespace nullmark {
 namespace {
 
 constexpr std::size_t kMostCells = 200, kMostRays = 256;
-
-double cpu_seconds() {
-  timespec time{};
-  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 /// Indices of the selected cells, or of so many of them, evenly from all trackers.
 std::vector<std::size_t> chosen_cells(const Plan& plan, const std::vector<bool>& selected) {
@@ -136,7 +130,7 @@ Forecast forecast(const Plan& plan, const std::vector<bool>& selected) {
   std::vector<bool> chosen(plan.cells.size(), false);
   for (const std::size_t i : chosen_cells(plan, selected)) chosen[i] = true;
   CellPreparer preparer(plan, kMostRays);
-  double began = cpu_seconds();
+  const double began = cpu_seconds();
   std::vector<PreparedCell> cells = prepare_all(preparer, plan, [&](std::size_t i) { return chosen[i]; });
   add_theory(cells);
   const double theory = cells.empty() ? 0 : (cpu_seconds() - began) / static_cast<double>(cells.size());

@@ -22,6 +22,7 @@
 #include "harness/model/in_flight.h"
 #include "harness/run/cell_images.h"
 #include "harness/run/cell_record.h"
+#include "harness/run/cpu_clock.h"
 #include "harness/run/task_thread.h"
 #include "harness/sampling/failure.h"
 #include "harness/sampling/test_families.h"
@@ -193,12 +194,6 @@ class PhaseClock {
   }
 
  private:
-  static double cpu_seconds() {
-    timespec time{};
-    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-  }
-
   const RunObserver& observer_;
   Clock::time_point wall_ = Clock::now();
   double cpu_ = cpu_seconds();
