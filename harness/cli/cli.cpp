@@ -196,7 +196,7 @@ class CommandLine {
       return summary.exit;
     });
     command->add_option("RESULTS", file_, "Results file")->required();
-    command->add_flag("--all", all_, "Also list, one by one, cells that need no look where they are many");
+    command->add_flag("--all", all_, "Also list every cell that needs no look");
     command->add_flag("--cases", cases_,
                       "Also show for each experiment and tracker if all samples were finite, the largest sample, worst error, "
                       "guards that fired");
