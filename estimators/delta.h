@@ -19,7 +19,7 @@ struct DeltaTracking {
   static constexpr bool kNeedsBound = true;
   static constexpr bool kLanes = true;
 
-  static constexpr bool kChromatic = std::is_same_v<Value, Spectrum>;
+  static constexpr bool kChromatic = kIsChromatic<Value>;
 
   std::string walks = "shared";
 

@@ -13,7 +13,8 @@
 
 namespace nullmark {
 
-// An estimator is a class template over Value, with its parameters as fields.  RayData is the estimator's own type of that name,
+// An estimator is a class template over Value (media/base/value.h): Real on grey media, a SpectrumOf some width on chromatic ones,
+// Lanes where walks run side by side.  Its parameters are fields.  RayData is the estimator's own type of that name,
 // or MediumRay<Value>.  harness/kernel/estimator_traits.h rejects members of these names with other signatures.  Required:
 //
 //   static constexpr kName, kSummary, kSource

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <array>
+
 #include "harness/sampling/reference_loops.h"
 #include "harness/testing/bench_kernel.h"
+#include "media/base/channels.h"
 
 namespace nullmark {
 namespace {
@@ -26,6 +29,25 @@ void plain_gaussian(benchmark::State& state, Real majorant) {
   };
   run_plain_bench(state,
                   [&](PlainRng& rng, std::uint64_t& lookups) { return plain_ratio_loop(rng, majorant, extinction, lookups); });
+}
+
+constexpr std::size_t kColours = 4;
+constexpr std::array<Real, kColours> kSpectrum = {1, 0.8, 0.6, 0.4};
+
+/// One walk for all channels, an array of weights.
+void plain_colours(benchmark::State& state, Real majorant) {
+  volatile Real half = majorant / 2;
+  std::array<Real, kColours> mu;
+  for (std::size_t c = 0; c < kColours; ++c) mu[c] = kSpectrum[c] * half;
+  const Real inverse = 1 / majorant;
+  run_plain_bench(state, [&](PlainRng& rng, std::uint64_t& lookups) {
+    std::array<Real, kColours> weight = {1, 1, 1, 1};
+    for (Real t = 0;; ++lookups) {
+      t -= std::log(1 - rng.uniform()) * inverse;
+      if (t >= 1) return weight;
+      for (std::size_t c = 0; c < kColours; ++c) weight[c] *= (majorant - mu[c]) * inverse;
+    }
+  });
 }
 
 void floor(benchmark::State& state) {
@@ -63,6 +85,9 @@ void add(const std::string& profile, void (*baseline)(benchmark::State&, Real), 
   benchmark::RegisterBenchmark("least step/0 random number, std::log, advance", floor);
   for (const Real lookups : {5., 30.}) {
     add("constant", plain_constant, lookups, make_medium({"homogeneous", {{"extinction", lookups / 2}}, {}, {}})->build());
+    const auto grey = make_medium({"homogeneous", {{"extinction", lookups / 2}}, {}, {}})->build();
+    add("4 channels, constant", plain_colours, lookups,
+        std::make_shared<Spectral>(grey, std::vector<Real>(kSpectrum.begin(), kSpectrum.end())));
     add("Gaussian", plain_gaussian, lookups, make_medium({"gaussian_bump", {{"amplitude", lookups}}, {}, {}})->build());
   }
 });

@@ -43,19 +43,14 @@ struct HeroWavelengthTracking {
 
   void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     if (walk.hero < 0) walk.hero = choose(walk.chance, ray.channels, rng);
-    Value bounded = extinction;
-    for (int c = 0; c < ray.channels; ++c) channel(bounded, c) = std::min(channel(extinction, c), at.rate());
-    const Coefficients<Value> mu(bounded, ray.albedo, at.rate());
+    const Coefficients<Value> mu(Value(smaller(extinction, at.rate())), ray.albedo, at.rate());
     const Value absorb = ray.draws_absorption ? mu.absorb : ray.value(0);
     const EventKind kind =
         choose_event(rng.uniform(), channel(absorb, walk.hero), channel(mu.scatter, walk.hero), channel(mu.null, walk.hero));
     walk.kind = kind;
-    for (int c = 0; c < ray.channels; ++c) {
-      const Real own = channel(kind == EventKind::absorb ? absorb : mu.of(kind), c);
-      const Real sum = channel(absorb, c) + channel(mu.scatter, c) + channel(mu.null, c);
-      channel(walk.contribution, c) *= own / at.rate();
-      channel(walk.chance, c) *= sum > 0 ? own / sum : 0;
-    }
+    const Value &own = kind == EventKind::absorb ? absorb : mu.of(kind), sum = absorb + mu.scatter + mu.null;
+    walk.contribution *= own / at.rate();
+    walk.chance *= select(sum > 0, Value(own / sum), ray.value(0));
     const Real mean = average(walk.chance);
     walk.contribution = mean > 0 ? Value(walk.contribution / mean) : ray.value(0);
     walk.chance = mean > 0 ? Value(walk.chance / mean) : ray.value(0);

@@ -36,7 +36,7 @@ class BlockKernel : public Kernel {
     std::array<Rng, kBlock> rng;
     std::array<std::uint32_t, kBlock> active;
     std::array<Real, kBlock> x, y, z, ahead{};
-    std::array<Real, kBlock*(std::is_same_v<Value, Real> ? 1 : kMaxChannels)> extinction;
+    std::array<Real, kBlock* static_cast<std::size_t>(kMostChannels<Value>)> extinction;
     std::vector<std::uint32_t> marked;  ///< for a profile, per walk: number of marks passed
   };
 

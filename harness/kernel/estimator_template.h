@@ -18,6 +18,10 @@ class EstimatorTemplate final : public EstimatorSource {
   void parameters(ParameterVisitor& visit) override {
     visit_parameters(grey_, visit);
     visit_parameters(chromatic_, visit);
+    if constexpr (kOfFixedWidth) {
+      visit_parameters(three_, visit);
+      visit_parameters(four_, visit);
+    }
     if constexpr (kInLanes) {
       visit_parameters(lanes_, visit);
       visit_parameters(single_, visit);
@@ -42,6 +46,10 @@ class EstimatorTemplate final : public EstimatorSource {
     }
     if (precision == Precision::float32) return nullptr;
     if (channels == 1) return std::make_unique<BlockKernel<Estimator, Real>>(grey_, 1);
+    if constexpr (kOfFixedWidth) {
+      if (channels == 3) return std::make_unique<BlockKernel<Estimator, SpectrumOf<3>>>(three_, channels);
+      if (channels == 4) return std::make_unique<BlockKernel<Estimator, SpectrumOf<4>>>(four_, channels);
+    }
     return std::make_unique<BlockKernel<Estimator, Spectrum>>(chromatic_, channels);
   }
   Walkers walkers() const override {
@@ -63,9 +71,13 @@ class EstimatorTemplate final : public EstimatorSource {
 
   /// Trackers derived from one that runs in lanes may not.
   static constexpr bool kInLanes = runs_in_lanes<Estimator>();
+  /// Widths known to the compiler take half the time, and each adds a second to a tracker's compilation: not for planted bugs.
+  static constexpr bool kOfFixedWidth = !requires { Estimator<Real>::kCaughtBy; };
   struct None {};
 
   Estimator<Real> grey_;
+  [[no_unique_address]] std::conditional_t<kOfFixedWidth, Estimator<SpectrumOf<3>>, None> three_;
+  [[no_unique_address]] std::conditional_t<kOfFixedWidth, Estimator<SpectrumOf<4>>, None> four_;
   Estimator<Spectrum> chromatic_;
   [[no_unique_address]] std::conditional_t<kInLanes, LanesOf<Estimator, Real>, None> lanes_;
   [[no_unique_address]] std::conditional_t<kInLanes, LanesOf<Estimator, float>, None> single_;

@@ -111,7 +111,7 @@ class EstimatorWalker final : public Walker<Value> {
     Along ray;
     Walk walk;
     nullmark::Ray local;
-    std::array<Real, std::is_same_v<Value, Real> ? 1 : kMaxChannels> extinction;
+    std::array<Real, kMostChannels<Value>> extinction;
   };
 
  public:

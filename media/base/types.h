@@ -21,8 +21,13 @@ using Affine = Eigen::Transform<Real, 3, Eigen::AffineCompact, Eigen::DontAlign>
 inline constexpr int kMaxChannels = 16;
 inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
+/// One number per channel, of a width known to the compiler.
+template <int width>
+using SpectrumOf = Eigen::Array < Real,
+      width, 1, Eigen::ColMajor | Eigen::DontAlign, width<0 ? kMaxChannels : width, 1>;
+
 /// One number per channel: a run-time count within a fixed capacity, so that it never allocates.
-using Spectrum = Eigen::Array<Real, Eigen::Dynamic, 1, Eigen::ColMajor | Eigen::DontAlign, kMaxChannels, 1>;
+using Spectrum = SpectrumOf<Eigen::Dynamic>;
 
 /// Axis-aligned box, lo <= hi in every component.
 struct Box {

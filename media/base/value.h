@@ -8,57 +8,99 @@
 
 namespace nullmark {
 
-// A `Value` is what one lookup returns: Real for a grey medium, Spectrum for a chromatic one.  The functions below let one source
-// serve both; a grey kernel holds no channel loop.
+// A `Value` is what one lookup returns: Real for a grey medium, a SpectrumOf some width for a chromatic one.  The functions below
+// let one source serve both; a grey kernel holds no channel loop.
 
 template <class Value>
-Value uniform_value(int channels, Real x);
-template <>
-inline Real uniform_value<Real>(int, Real x) {
-  return x;
-}
-template <>
-inline Spectrum uniform_value<Spectrum>(int channels, Real x) {
-  return Spectrum::Constant(channels, x);
+inline constexpr bool kIsChromatic = false;
+template <int width>
+inline constexpr bool kIsChromatic<SpectrumOf<width>> = true;
+
+/// Most channels of a Value.
+template <class Value>
+inline constexpr int kMostChannels = 1;
+template <int width>
+inline constexpr int kMostChannels<SpectrumOf<width>> = SpectrumOf<width>::MaxRowsAtCompileTime;
+
+template <class Value>
+Value uniform_value(int channels, Real x) {
+  if constexpr (kIsChromatic<Value>)
+    return Value::Constant(channels, x);
+  else
+    return x;
 }
 
 template <class Value>
-Value load(const Real* data, int channels);
-template <>
-inline Real load<Real>(const Real* data, int) {
-  return *data;
-}
-template <>
-inline Spectrum load<Spectrum>(const Real* data, int channels) {
-  return Eigen::Map<const Spectrum>(data, channels);
+Value load(const Real* data, int channels) {
+  if constexpr (kIsChromatic<Value>)
+    return Eigen::Map<const Value>(data, channels);
+  else
+    return *data;
 }
 
 inline void store(Real value, Real* data) { *data = value; }
-inline void store(const Spectrum& value, Real* data) {
+template <int width>
+void store(const SpectrumOf<width>& value, Real* data) {
   for (Eigen::Index c = 0; c < value.size(); ++c) data[c] = value[c];
 }
 
+/// Any expression of channels, and the spectrum that it comes to.
+template <class T>
+using Colours = Eigen::ArrayBase<T>;
+template <class T>
+using Evaluated = SpectrumOf<T::RowsAtCompileTime>;
+
 inline Real largest(Real x) { return x; }
-inline Real largest(const Spectrum& x) { return x.maxCoeff(); }
+template <class T>
+Real largest(const Colours<T>& x) {
+  return x.maxCoeff();
+}
 inline Real smallest(Real x) { return x; }
-inline Real smallest(const Spectrum& x) { return x.minCoeff(); }
+template <class T>
+Real smallest(const Colours<T>& x) {
+  return x.minCoeff();
+}
 inline Real channel(const Real& x, int) { return x; }
-inline Real channel(const Spectrum& x, int c) { return x[c]; }
 inline Real& channel(Real& x, int) { return x; }
-inline Real& channel(Spectrum& x, int c) { return x[c]; }
+template <int width>
+Real channel(const SpectrumOf<width>& x, int c) {
+  return x[c];
+}
+template <int width>
+Real& channel(SpectrumOf<width>& x, int c) {
+  return x[c];
+}
 inline int channel_count(Real) { return 1; }
-inline int channel_count(const Spectrum& x) { return static_cast<int>(x.size()); }
+template <class T>
+int channel_count(const Colours<T>& x) {
+  return static_cast<int>(x.size());
+}
 
 inline Real average(Real x) { return x; }
-inline Real average(const Spectrum& x) { return x.mean(); }
+/// From the first channel on, so that the sum is of the same bits at every width.
+template <class T>
+Real average(const Colours<T>& x) {
+  Real sum = 0;
+  for (Eigen::Index c = 0; c < x.size(); ++c) sum += x[c];
+  return sum / static_cast<Real>(x.size());
+}
 inline Real magnitude(Real x) { return std::abs(x); }
-inline Spectrum magnitude(const Spectrum& x) { return x.abs(); }
+template <class T>
+Evaluated<T> magnitude(const Colours<T>& x) {
+  return x.abs();
+}
 
-inline Spectrum exponential(const Spectrum& x) { return x.exp(); }
+template <class T>
+Evaluated<T> exponential(const Colours<T>& x) {
+  return x.exp();
+}
 
 /// sgn(x) |x|^(1/2), and what undoes it.
 inline Real signed_root(Real x) { return std::copysign(std::sqrt(std::abs(x)), x); }
-inline Spectrum signed_root(const Spectrum& x) { return x.sign() * x.abs().sqrt(); }
+template <class T>
+Evaluated<T> signed_root(const Colours<T>& x) {
+  return x.sign() * x.abs().sqrt();
+}
 template <class Value>
 Value signed_square(const Value& x) {
   return x * magnitude(x);
@@ -82,12 +124,19 @@ inline constexpr bool kInFloat = false;
 
 /// `a` where `yes`, else `b`.
 inline Real select(bool yes, Real a, Real b) { return yes ? a : b; }
-template <class Condition>
-Spectrum select(const Eigen::ArrayBase<Condition>& yes, const Spectrum& a, const Spectrum& b) {
+template <class Condition, class A, class B>
+Evaluated<A> select(const Colours<Condition>& yes, const Colours<A>& a, const Colours<B>& b) {
   return yes.select(a, b);
 }
 
-inline Spectrum larger(const Spectrum& x, Real least) { return x.max(least); }
+template <class T>
+Evaluated<T> smaller(const Colours<T>& x, Real most) {
+  return x.min(most);
+}
+template <class T>
+Evaluated<T> larger(const Colours<T>& x, Real least) {
+  return x.max(least);
+}
 
 inline bool none(bool x) { return !x; }
 
@@ -98,6 +147,9 @@ const Value& entry(const std::vector<Value>& table, Index i) {
 
 /// Whether every channel is 0.
 inline bool vanished(Real x) { return x == 0; }
-inline bool vanished(const Spectrum& x) { return (x == 0).all(); }
+template <class T>
+bool vanished(const Colours<T>& x) {
+  return (x == 0).all();
+}
 
 }  // namespace nullmark
