@@ -54,8 +54,8 @@ struct MajorantGuidedRatio {
   }
 
   void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
-    if (none(!walk.has_looked)) walk.weight *= (at.rate() - extinction) / (at.rate() * walk.rate);
-    walk.rate = larger(kLeastRate, (at.rate() - smallest(extinction)) / at.rate());
+    if (none(!walk.has_looked)) walk.weight *= null_ratio(at, extinction) / walk.rate;
+    walk.rate = larger(kLeastRate, null_ratio(at, smallest(extinction)));
     walk.has_looked = true;
   }
 

@@ -83,7 +83,7 @@ struct BidirectionalMis {
 
   void consume(Walk& walk, const MediumRay<Value>&, const Flight& at, const Value& extinction, auto&) const {
     std::vector<Value>& weight = (walk.turned ? walk.backwards : walk.forwards).weight;
-    weight.push_back(weight.back() * ((at.rate() - extinction) / at.rate()));
+    weight.push_back(weight.back() * null_ratio(at, extinction));
   }
 
   /// Pairs are summed from the nearest outwards, until what is left of a vertex is lost in the rounding of the sum: their number

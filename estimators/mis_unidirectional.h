@@ -32,7 +32,7 @@ struct UnidirectionalMis {
   auto propose(Walk&, const auto&, auto& flight, auto& rng) const { return flight.next(rng); }
 
   void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
-    walk.weight *= (at.rate() - extinction) / at.rate();
+    walk.weight *= null_ratio(at, extinction);
     walk.last = walk.weight * share(at.depth_left());
     walk.sum += walk.last;
   }

@@ -47,7 +47,7 @@ struct NextFlightDeltaTracking {
 
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
     const Distance<Value> escape = exponential(-at.depth_left()), threshold = rng.uniform() * at.rate();
-    if (ray.weigh_all) walk.sum += walk.alive * ((at.rate() - extinction) / at.rate()) * escape;
+    if (ray.weigh_all) walk.sum += walk.alive * null_ratio(at, extinction) * escape;
     walk.alive = select(extinction > threshold, ray.value(0), walk.alive);
     if (!ray.weigh_all) walk.sum += walk.alive * escape;
     walk.done = vanished(walk.alive);

@@ -29,7 +29,7 @@ struct NextFlightRatioTracking {
   auto propose(Walk&, const auto&, auto& flight, auto& rng) const { return flight.next(rng); }
 
   void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
-    walk.weight *= (at.rate() - extinction) / at.rate();
+    walk.weight *= null_ratio(at, extinction);
     walk.sum += walk.weight * exponential(-at.depth_left());
   }
 

@@ -20,12 +20,6 @@ void land_anywhere(const MediumRay<Value>& ray, Flight& flight, auto& rng) {
   if (!flight.advance_to(rng.uniform() * ray.majorant.total_depth())) flight.advance_to(0);  // denormal depths round up
 }
 
-/// 1 - mu/mub where the walk is.
-template <class Value>
-Value null_ratio(const Flight& at, const Value& extinction) {
-  return (at.rate() - extinction) / at.rate();
-}
-
 /// e^{-M} (W_0 + W_1 + ...), W_0 = 1.  W may pass e^M, and e^{-M} is 0 from M = 746 on, so W is kept as a number near 1 times a
 /// power of 2, which a term's e^{-M} takes in: a term underflows where it is 0 in double, and none overflows.
 template <class Value>

@@ -47,7 +47,7 @@ struct PublishedRatioTracking {
   }
 
   void consume(Walk& walk, const MediumRay<Value>&, const Flight& at, const Value& extinction, auto&) const {
-    walk.weight *= (at.rate() - extinction) / at.rate();
+    walk.weight *= null_ratio(at, extinction);
   }
 
   Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.weight; }

@@ -26,7 +26,7 @@ struct RatioTracking {
   auto propose(Walk&, const auto&, auto& flight, auto& rng) const { return flight.next(rng); }
 
   void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
-    walk.weight *= (at.rate() - extinction) / at.rate();
+    walk.weight *= null_ratio(at, extinction);
   }
 
   Value result(const Walk& walk, const auto&) const { return walk.weight; }

@@ -39,7 +39,7 @@ struct RatioRoulette {
   bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const { return !walk.ended && flight.next(rng); }
 
   void consume(Walk& walk, const MediumRay<Value>&, const Flight& at, const Value& extinction, auto& rng) const {
-    walk.weight *= (at.rate() - extinction) / at.rate();
+    walk.weight *= null_ratio(at, extinction);
     if (!(largest(magnitude(walk.weight)) < threshold)) return;
     walk.ended = !(rng.uniform() < survival);
     walk.weight *= walk.ended ? 0 : 1 / survival;

@@ -75,7 +75,7 @@ struct ResidualRatioTracking {
   auto propose(Walk&, const auto& ray, auto& flight, auto& rng) const { return flight.next(rng, ray.with_residual); }
 
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
-    Value factor = (at.rate() - (extinction - ray.control.at(at.position(), at.piece()))) / at.rate();
+    Value factor = null_ratio(at, Value(extinction - ray.control.at(at.position(), at.piece())));
     for (int i = roots(ray); i > 0; --i) factor = signed_root(factor);
     walk.weight *= factor;
   }

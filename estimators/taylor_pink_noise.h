@@ -54,7 +54,7 @@ struct TaylorPinkNoise {
   }
 
   void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
-    walk.product *= (at.rate() - extinction) / at.rate() * scale(ray);
+    walk.product *= null_ratio(at, extinction) * scale(ray);
     walk.sum += walk.product;
   }
 

@@ -18,7 +18,7 @@ struct PlantedSlight : RatioTracking<Value> {
   using Base = RatioTracking<Value>;
   using Walk = typename Base::Walk;
 
-  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.weight * kFactor; }
+  Value result(const Walk& walk, const auto&) const { return walk.weight * kFactor; }
 
   Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity quantity) const {
     Theory theory = Base::theory(ray, profile, c, quantity);

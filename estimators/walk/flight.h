@@ -50,6 +50,7 @@ class Flight {
   std::uint32_t collisions() const { return collisions_; }
   /// Sampling rate mub at the position, 1/length.
   Real rate() const { return rates_->known(piece_).rate; }
+  Real inverse_rate() const { return rates_->known(piece_).inverse_rate; }
   /// int rate from the ray's begin to the position, and from the position to the ray's end.
   Real depth() const { return depth_; }
   Real depth_left() const { return rates_->total_depth() - depth_; }
@@ -88,5 +89,12 @@ class Flight {
   std::uint32_t collisions_ = 0;
   Real depth_ = 0, position_ = 0;
 };
+
+/// (mub - mu)/mub where the walk is: the weight of a null collision.  At most 1, 0 where the majorant is tight, negative where it
+/// is violated.  By the inverse rate that the flight has: a division in each step would cost as much as a random number.
+template <class Value>
+Value null_ratio(const auto& at, const Value& extinction) {
+  return (at.rate() - extinction) * at.inverse_rate();
+}
 
 }  // namespace nullmark

@@ -107,6 +107,7 @@ class LaneFlight {
   Pack position() const { return at_.position; }
   Index piece() const { return at_.piece; }
   Pack rate() const { return rates_.template rate<several>(at_.piece); }
+  Pack inverse_rate() const { return rates_.template of<several, &RatePiece<T>::inverse_rate>(at_.piece); }
   Pack depth() const { return at_.depth; }
   Pack depth_left() const { return Pack(rates_.total_) - at_.depth; }
   Pack total_depth() const { return rates_.total_; }

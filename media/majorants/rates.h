@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <type_traits>
 #include <vector>
 
@@ -37,7 +38,9 @@ class RatePieces {
     if (rate > 0) total_depth_ += rate * (end - from);
     if (empty_) pieces_.clear();
     empty_ = false;
-    pieces_.push_back({from, end, rate, 1 / rate, before, total_depth_});
+    // Finite for denormal rates as well: 0 times it is then a number.
+    const Real inverse = rate > 0 ? std::min(1 / rate, std::numeric_limits<Real>::max()) : kInfinity;
+    pieces_.push_back({from, end, rate, inverse, before, total_depth_});
   }
 
   std::size_t size() const { return empty_ ? 0 : pieces_.size(); }
@@ -134,10 +137,13 @@ class Rates {
       return known_.all().data();
     } else {
       const auto narrow = [](Real x) { return static_cast<T>(x); };
+      const auto narrow_inverse = [&](const RatePiece<Real>& p) {
+        return p.rate > 0 ? narrow(std::min<Real>(p.inverse_rate, std::numeric_limits<T>::max())) : narrow(p.inverse_rate);
+      };
       if (single_.empty())
         for (const RatePiece<Real>& p : known_.all())
-          single_.push_back({narrow(p.begin), narrow(p.end), narrow(p.rate), narrow(p.inverse_rate), narrow(p.depth_before),
-                             narrow(p.depth_after)});
+          single_.push_back(
+              {narrow(p.begin), narrow(p.end), narrow(p.rate), narrow_inverse(p), narrow(p.depth_before), narrow(p.depth_after)});
       return single_.data();
     }
   }

@@ -80,7 +80,7 @@ static int32_t ratio_sample(void* self, const nullmark_ray* ray, const nullmark_
     for (int64_t i = 0; i < n; ++i)
       for (int64_t c = 0; c < channels; ++c)
         result->value[state->alive[i] * channels + c] *=
-            (state->rate[i] - state->extinction[i * channels + c]) / state->rate[i];
+            (state->rate[i] - state->extinction[i * channels + c]) * (1 / state->rate[i]);
   }
   return NULLMARK_OK;
 }

@@ -97,7 +97,7 @@ std::int32_t walk(State& state, const nullmark_ray& ray, const nullmark_harness&
     const double slip = state.fault == "slip" ? 1.01 : 1;
     for (std::size_t i = 0; i < left; ++i)
       for (std::size_t c = 0; c < channels; ++c)
-        value[state.alive[i] * channels + c] *= (state.rate[i] - slip * state.extinction[i * channels + c]) / state.rate[i];
+        value[state.alive[i] * channels + c] *= (state.rate[i] - slip * state.extinction[i * channels + c]) * (1 / state.rate[i]);
   }
   return NULLMARK_OK;
 }
