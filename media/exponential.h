@@ -39,6 +39,13 @@ struct ExponentialProfile {
     const std::pair<Real, Real> ends = std::minmax({value(a), value(b)});
     return rate == 0 ? ends : outward(ends);
   }
+
+  /// Fifteen points resolve a factor of e^8.
+  void knots(std::vector<Real>& s) const {
+    constexpr Real kGrowth = 8;
+    const Real pieces = std::ceil(std::abs(rate) / kGrowth);
+    for (Real i = 1; i < pieces; ++i) s.push_back(i / pieces);
+  }
 };
 
 using Exponential = AlongAxis<ExponentialProfile>;

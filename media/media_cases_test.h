@@ -72,6 +72,7 @@ class Cases {
     add("exponential", "exponential", in_box({{"axis", "y"}}), [](const P& s) { return 3 * std::exp(-3 * s[1]); });
     add("steep_exponential", "exponential", {{"amplitude", 1e-3}, {"rate", 12.}},
         [](const P& s) { return static_cast<long double>(1e-3) * std::exp(12 * s[0]); });
+    add("steepest_exponential", "exponential", {{"rate", -700.}}, [](const P& s) { return 3 * std::exp(-700 * s[0]); });
     add("flat_exponential", "exponential", {{"rate", 1e-14}}, [](const P& s) { return 3 * std::exp(1e-14L * s[0]); });
     add("rate_0", "exponential", {{"rate", 0.}}, [](const P&) { return 3.L; });
     add("cube", "exponential_cube", {}, [](const P& s) { return -std::log(s[0]); });

@@ -31,6 +31,7 @@ auto located(const std::string& pointer, F&& f) {
 constexpr Real kDeepestSingle = 1 << 14;
 /// Of a medium from its frame's origin, in its own sizes: its inside is still told to 2^-14.
 constexpr Real kFarthestSingle = 1 << 10, kFarthestDouble = 0x1p39;
+constexpr Real kFarthestRaySingle = 1 << 14, kFarthestRayDouble = 0x1p43;
 
 /// What a tracker throws is its cell's failure; a mistake in the configuration and a lack of memory are not.
 template <class F>
@@ -135,6 +136,14 @@ std::string CellPreparer::why_not(const Cell& cell, const Scene& scene, const Ke
         "it "
         "nearer{}",
         farthest, single ? "float" : "double", single ? ", or \"double\"" : "");
+  // A point is the ray's origin plus a distance along it, in the medium's frame.
+  const Real farthest_ray = single ? kFarthestRaySingle : kFarthestRayDouble;
+  for (const Ray& ray : scene.rays->local)
+    if (ray.length() > 0 &&
+        std::max(std::abs(ray.begin), std::abs(ray.end)) * ray.direction.norm() > farthest_ray * box.extent().minCoeff())
+      return fmt::format(
+          "a ray begins over {:g} times the medium's size away, where {} has no digits for a distance; expected it nearer{}",
+          farthest_ray, single ? "float" : "double", single ? ", or \"double\"" : "");
   if (const Real depth = single ? deepest_majorant(scene) : 0; depth > kDeepestSingle)
     return fmt::format("rays of majorant depth {:.6g} leave float no digits for a flight; expected at most {}, or \"double\"",
                        depth, kDeepestSingle);

@@ -171,6 +171,38 @@ TEST(Judging, FarCoordinatesAreNoBias) {
   }
 }
 
+/// A ray that begins far away has no digits left where it meets the medium.
+TEST(Judging, RaysFromFarAwayAreNoBias) {
+  for (const auto& [from, precision] :
+       {std::pair{"-1e15", "double"}, {"-1e12", "double"}, {"-1e7", "float"}, {"-1e3", "float"}}) {
+    const auto records = run_untimed(read_config(
+        fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e","precision":"{}",
+            "rays":{{"type":"single","from":[{},0.5,0.5],"to":[2,0.5,0.5]}},"samples_per_ray":65536,
+            "matrix":{{"estimator":["ratio","delta"],"medium":"linear","majorant":["global",{{"type":"grid","resolution":16}}]}}}}]}})",
+                    precision, from),
+        "far.json"));
+    for (const CellRecord& record : records) {
+      const bool farthest = std::string(from) == "-1e15" || std::string(from) == "-1e7";
+      EXPECT_EQ(record.status, farthest ? Status::skipped : Status::ok) << from << record.cell.name << record.reason;
+      if (record.verdict) {
+        EXPECT_NE(record.verdict->unbiased, Outcome::fail) << from << record.cell.name << ": " << record.verdict->reason;
+        EXPECT_NE(record.verdict->lawful, Outcome::fail) << from << record.cell.name << ": " << record.verdict->reason;
+      }
+    }
+  }
+}
+
+/// Theory meets the narrow peak of a steep profile.
+TEST(Judging, SteepProfilesAreNoBias) {
+  const auto records = run_on_a_line(R"("samples_per_ray":100000,"verdict":{"laws":"always"},
+      "matrix":{"estimator":["ratio","delta","residual_ratio"],"medium":{"type":"exponential","rate":[-70,-300,-700]}})");
+  for (const CellRecord& record : records) {
+    EXPECT_NE(record.verdict.value().unbiased, Outcome::fail) << record.cell.name << ": " << record.verdict->reason;
+    EXPECT_NE(record.verdict->lawful, Outcome::fail) << record.cell.name << ": " << record.verdict->reason;
+    EXPECT_NEAR(*record.channel.at(0).variance / *record.channel[0].variance_theory, 1, 0.2) << record.cell.name;
+  }
+}
+
 /// The extinction is unbounded at y = 0, which the ray does not touch.
 TEST(Judging, APoleElsewhereIsNoBias) {
   const auto records = run_on_a_line(

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "harness/statistics/ks_bound.h"
 
@@ -116,7 +117,8 @@ class LawTester {
     // With many collisions no count comes often enough.
     constexpr Real kMostCollisions = 500;
     if (cell_.quantity == Quantity::transmittance && kernel_.states_count_law() && theory_.lookups.value_or(0) < kMostCollisions)
-      laws_ = kernel_.count_law(workspace, make_profile(*scene_.medium->medium, scene_.rays->local[ray], context_.bounds.segments()));
+      laws_ =
+          kernel_.count_law(workspace, make_profile(*scene_.medium->medium, scene_.rays->local[ray], context_.bounds.segments()));
     by_count_.emplace_back();
 
     Real depth = 0;
@@ -141,7 +143,10 @@ class LawTester {
       // Residual flights have rates of their own.
       if (std::abs(walk.total_depth - majorant_depth_) > kMapping * majorant_depth_) continue;
       ++mapped_;
-      badly_mapped_ = badly_mapped_ || std::abs(depth_at(step.position) - step.depth) > kMapping * (1 + majorant_depth_);
+      // A distance far along the ray has lost the digits of its magnitude.
+      const Real rounding = 4 * std::numeric_limits<Real>::epsilon() * std::abs(step.position) * step.rate;
+      badly_mapped_ =
+          badly_mapped_ || std::abs(depth_at(step.position) - step.depth) > kMapping * (1 + majorant_depth_) + rounding;
     }
     if (n > 0 && walk.total_depth > 0) first_.push_back(std::expm1(-walk.steps[0].depth) / std::expm1(-walk.total_depth));
     by_count(n, values);
@@ -301,9 +306,9 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
 
 }  // namespace
 
-std::optional<std::vector<LawRecord>> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
-                                                SampleRange range, const CellTheory& theory, const LawBudget& budget,
-                                                const std::function<bool()>& stop) {
+std::optional<std::vector<LawRecord>> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel,
+                                                const Targets& targets, SampleRange range, const CellTheory& theory,
+                                                const LawBudget& budget, const std::function<bool()>& stop) {
   LawTester tester(cell, scene, kernel, targets, theory);
   if (!tester.run(budget, stop)) return std::nullopt;
   std::vector<LawRecord> records = tester.records();
