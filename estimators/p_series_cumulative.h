@@ -87,7 +87,10 @@ struct PowerSeriesCumulative {
     const Real depth = ray.majorant.total_depth();
     const auto first = [&](int k) { return series_moments(ray, profile, k).first; };
     std::vector<Real> log_first, log_weight(static_cast<std::size_t>(ray.channels), 0), log_chances{0};
-    for (int k = 0; k < ray.channels; ++k) log_first.push_back(std::log(std::abs(first(k))));
+    for (int k = 0; k < ray.channels; ++k) {
+      log_first.push_back(std::log(std::abs(first(k))));
+      if (log_first.back() == kInfinity) return {};
+    }
     constexpr Real kRare = -100;
     Theory theory{.lookups = 1};
     Real squares = 1;

@@ -130,6 +130,7 @@ TEST(Majorants, PrescribedFollowsItsGradientAndRefusesNegativeRates) {
   PrescribedMajorant(*medium, 5, {0, 95, 0}).segments(ray, ray, buffer);
   EXPECT_DOUBLE_EQ(buffer.segments[0].majorant, 5 + 95 * 0.25);
   EXPECT_THROW(PrescribedMajorant(*medium, 5, {0, -6, 0}), ParameterError);
+  EXPECT_THROW(PrescribedMajorant(*medium, 1e-320, {0, 0, 0}), ParameterError);
 }
 
 TEST(Majorants, AnUnboundedMediumNeedsAPrescribedRate) {

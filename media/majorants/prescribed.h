@@ -19,10 +19,12 @@ class PrescribedMajorant final : public MajorantStructure {
     for (int corner = 0; corner < 8; ++corner) {
       const Vec3 p(corner & 1 ? box.hi.x() : box.lo.x(), corner & 2 ? box.hi.y() : box.lo.y(),
                    corner & 4 ? box.hi.z() : box.lo.z());
-      if (const Real rate = value + gradient.dot(to_world * p); !(rate > 0))
-        throw ParameterError(
-            gradient.isZero() ? "value" : "gradient",
-            "the majorant falls to " + std::to_string(rate) + " at a corner of the medium; expected a rate above 0 everywhere");
+      // Products of smaller rates underflow.
+      constexpr Real kLeast = 1e-300;
+      if (const Real rate = value + gradient.dot(to_world * p); !(rate > 0) || rate < kLeast)
+        throw ParameterError(gradient.isZero() ? "value" : "gradient",
+                             "the majorant falls to " + std::to_string(rate) +
+                                 " at a corner of the medium; expected a rate above 0 everywhere, and at least 1e-300");
     }
   }
 
