@@ -312,6 +312,8 @@ class CommandLine {
   void add_make_volume() {
     CLI::App* command = add("make-volume", "Write a procedural smoke volume (OpenVDB, grid \"density\")", [this] {
       if (!force_ && std::filesystem::exists(file_)) throw InputError(file_ + ": exists; --force replaces it");
+      expect_replaceable(file_);
+      if (std::filesystem::is_symlink(file_)) throw InputError(file_ + ": is a link; give the path of the file");
       write_procedural_vdb(file_, volume_);
       return ExitCode::ok;
     });

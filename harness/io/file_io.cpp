@@ -99,6 +99,8 @@ std::string read_file(const std::string& path) {
   if (const int reason = errno; !in)
     throw InputError(reason == ENOENT ? path + ": no such file"
                                       : fmt::format("{}: cannot be read: {}; expected a file", path, std::strerror(reason)));
+  if (fs::is_regular_file(path, error) && fs::file_size(path, error) > kLargestText)
+    throw InputError(path + ": holds more than 1 GiB; expected a configuration or results");
   std::string text = read_stream(in, path);
   return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path) : text;
 }

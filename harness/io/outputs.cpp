@@ -22,7 +22,9 @@ fs::path destination(fs::path path) {
 
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code error;
-  return fs::equivalent(a, b, error) || destination(a) == destination(b);
+  // A path that leads nowhere has no destination.
+  const fs::path leads = destination(a);
+  return fs::equivalent(a, b, error) || (!leads.empty() && leads == destination(b));
 }
 
 }  // namespace

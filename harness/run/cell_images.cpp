@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "harness/io/file_io.h"
+#include "harness/io/json_input.h"
 #include "harness/run/image.h"
 
 namespace nullmark {
@@ -63,10 +65,16 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
   };
   try {
     std::filesystem::create_directories(options.image_directory);
+    const auto path_of = [&](const std::string& file) {
+      const std::filesystem::path path = std::filesystem::path(options.image_directory) / file;
+      if (std::filesystem::is_symlink(path)) throw InputError(path.string() + ": is a link, and is not replaced by a picture");
+      expect_replaceable(path.string());
+      return path.string();
+    };
     const auto write = [&](const char* kind, const std::vector<Real>& values, std::size_t count, Real maximum) {
       const std::string file = fmt::format("{}.{}.png", prepared.cell->id, kind);
-      write_png((std::filesystem::path(options.image_directory) / file).string(), rays.width, rays.height,
-                static_cast<int>(count), values, maximum, prepared.cell->quantity == Quantity::radiance && &values == &mean);
+      write_png(path_of(file), rays.width, rays.height, static_cast<int>(count), values, maximum,
+                prepared.cell->quantity == Quantity::radiance && &values == &mean);
       record.images[kind] = (std::filesystem::path(options.image_prefix) / file).string();
     };
     write("mean", mean, shown, prepared.cell->image_maximum);
@@ -75,8 +83,7 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
     write("lookups", lookups, 1, greatest(lookups));
     write("null_collisions", null_collisions, 1, greatest(null_collisions));
     const std::string file = fmt::format("{}.exr", prepared.cell->id);
-    write_exr((std::filesystem::path(options.image_directory) / file).string(), rays.width, rays.height,
-              layers(prepared, sampled));
+    write_exr(path_of(file), rays.width, rays.height, layers(prepared, sampled));
     record.images["layers"] = (std::filesystem::path(options.image_prefix) / file).string();
   } catch (const std::exception& error) {
     observer.warning(error.what());

@@ -73,6 +73,7 @@ void Journal::lock() {
 
 void Journal::read(const std::string& config_hash, Mode mode) {
   const std::string text = read_file(path_);
+  expect_own(text, config_hash);
   const std::size_t first_end = text.find('\n');
   std::size_t complete = first_end == std::string::npos ? 0 : text.rfind('\n') + 1;
   // After a power cut, unsynced bytes may read as zeros.  A head that is not synced has no lines behind it.
@@ -139,11 +140,25 @@ void Journal::read_line(const std::string& line, const std::string& where, const
     cells_[at->second] = std::move(record);
 }
 
-void Journal::write_head(const std::string& config_hash) {
+std::string Journal::head(const std::string& config_hash) const {
   const Json head = {
       {kHead, kJournalSchema}, {kVersionKey, RunRecord::kVersion}, {"config_hash", config_hash}, {"build", build_json(build_)}};
-  write_all(file_, head.dump() + "\n", path_);
+  return head.dump() + "\n";
+}
+
+void Journal::write_head(const std::string& config_hash) {
+  write_all(file_, head(config_hash), path_);
   make_durable(file_, path_);
+}
+
+/// Refuses a file of that name that no run has left, which is not to be emptied.
+void Journal::expect_own(const std::string& text, const std::string& config_hash) const {
+  constexpr std::size_t kBeginning = 8;
+  const std::size_t told = std::min(kBeginning, text.size());
+  const std::string_view beginning = std::string_view(text).substr(0, told);
+  // After a power cut, unsynced bytes may read as zeros.
+  if (beginning != head(config_hash).substr(0, told) && beginning.find('\0') == std::string_view::npos)
+    throw InputError(path_ + ": is not the journal of a run, which needs this name; move the file, or give another -o");
 }
 
 void Journal::append(const CellRecord& record) {

@@ -48,7 +48,9 @@ class Journal {
   void read(const std::string& config_hash, Mode mode);
   void read_head(const JsonNode& node, const std::string& config_hash);
   void read_line(const std::string& line, const std::string& where, const std::string& config_hash);
+  std::string head(const std::string& config_hash) const;
   void write_head(const std::string& config_hash);
+  void expect_own(const std::string& text, const std::string& config_hash) const;
 
   std::string path_;
   int file_ = -1;

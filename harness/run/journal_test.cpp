@@ -65,6 +65,15 @@ TEST_F(JournalTest, IsAFileOfItsOwn) {
     EXPECT_EQ(open_error("hash", mode), path_ + ": is not a regular file; remove it or give another -o");
 }
 
+TEST_F(JournalTest, LeavesAnotherFileOfItsNameAlone) {
+  for (const char* text : {"precious notes", "precious\nnotes\n", "{\"mine\":1}"})
+    for (const Journal::Mode mode : {Journal::Mode::fresh, Journal::Mode::resume, Journal::Mode::overwrite}) {
+      std::ofstream(path_, std::ios::trunc) << text;
+      EXPECT_NE(open_error("hash", mode).find(path_ + ": is not the journal of a run"), std::string::npos) << text;
+      EXPECT_EQ(read_file(path_), text);
+    }
+}
+
 TEST_F(JournalTest, DropsATornLastLineAndGoesOnAfterIt) {
   leave({cells_[0], cells_[1]});
   const std::string whole = read_file(path_);
@@ -105,6 +114,8 @@ TEST_F(JournalTest, RefusesADamagedHead) {
   leave({cells_[0]});
   const std::string text = read_file(path_);
   std::ofstream(path_, std::ios::binary | std::ios::trunc) << "[1/2] a line of progress: ok\n" << text;
+  EXPECT_NE(open_error("hash", Journal::Mode::resume).find(path_ + ": is not the journal of a run"), std::string::npos);
+  std::ofstream(path_, std::ios::binary | std::ios::trunc) << text.substr(0, 20) << "damaged\n" << text;
   EXPECT_NE(open_error("hash", Journal::Mode::resume).find(path_ + ":1"), std::string::npos);
 }
 

@@ -189,6 +189,33 @@ TEST_F(Kill, DevicesAreNotReplaced) {
     EXPECT_TRUE(std::filesystem::is_fifo(folder_ / "pipe")) << command;
     EXPECT_FALSE(exists("pipe.journal"));
   }
+  EXPECT_EQ(run("make-volume pipe --resolution 8 --force"), static_cast<int>(ExitCode::input_error));
+  EXPECT_TRUE(std::filesystem::is_fifo(folder_ / "pipe"));
+  std::ofstream(folder_ / "kept") << "kept";
+  std::filesystem::create_symlink("kept", folder_ / "link.vdb");
+  EXPECT_EQ(run("make-volume link.vdb --resolution 8 --force"), static_cast<int>(ExitCode::input_error));
+  EXPECT_EQ(read("kept"), "kept");
+}
+
+TEST_F(Kill, PicturesReplaceNoPipeAndNoTargetOfALink) {
+  std::ofstream(folder_ / "p.json") << R"({"nullmark":"config/2","name":"p","timing":{"enabled":false},"experiments":[{"name":"e",
+    "rays":{"type":"orthographic","width":2,"height":2},"samples_per_ray":2,"verdict":{"enabled":false},"images":true,
+    "matrix":{"estimator":"ratio","medium":"linear"}}]})";
+  ASSERT_EQ(run("run p.json -o p.r.json"), 0) << read("err");
+  std::filesystem::path layers;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "p.r.images"))
+    if (entry.path().extension() == ".exr") layers = entry.path();
+  std::filesystem::remove(layers);
+  ASSERT_EQ(::mkfifo(layers.c_str(), 0666), 0);
+  EXPECT_EQ(run("run p.json -o p.r.json --force"), 0);
+  EXPECT_NE(read("err").find("is not a regular file"), std::string::npos) << read("err");
+  EXPECT_TRUE(std::filesystem::is_fifo(layers));
+  std::filesystem::remove(layers);
+  std::ofstream(folder_ / "kept") << "kept";
+  std::filesystem::create_symlink(folder_ / "kept", layers);
+  EXPECT_EQ(run("run p.json -o p.r.json --force"), 0);
+  EXPECT_NE(read("err").find("is a link"), std::string::npos) << read("err");
+  EXPECT_EQ(read("kept"), "kept");
 }
 
 TEST_F(Kill, FullStandardOutputIsAnError) {

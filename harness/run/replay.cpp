@@ -206,7 +206,13 @@ Replay replay_sample(const RunRecord& run, const std::string& file, const std::s
     throw InputError(fmt::format("--ray: found {}; the rays of \"{}\" are 0 to {}", *wanted.ray, name, rays - 1));
 
   SampleChoice choice = wanted;
-  if (!choice.sample) choice = search(cell, samples_per_ray(cell, record), choice);
+  if (!choice.sample) {
+    const std::uint64_t samples = samples_per_ray(cell, record);
+    if (constexpr std::uint64_t kMostSearched = 1'000'000'000; samples > kMostSearched)
+      throw InputError(
+          fmt::format("{}: \"{}\" has {} samples a ray, too many to search; --sample chooses one", file, name, samples));
+    choice = search(cell, samples, choice);
+  }
 
   Replay replay;
   replay.cell = name;

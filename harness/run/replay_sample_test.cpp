@@ -183,6 +183,15 @@ TEST(ReplaySample, RefusesWhatIsNotThere) {
 
 class ReplayCli : public ProgramTest {};
 
+TEST_F(ReplayCli, SearchesNoCellWithoutEnd) {
+  write("c.json",
+        R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e","samples_per_ray":1000000000000000,
+                      "matrix":{"estimator":"ratio","medium":"linear","rays":"single"}}]})");
+  run("run c.json -o r.json --time-budget 0.1");
+  EXPECT_EQ(run("replay r.json ratio/linear/global"), static_cast<int>(ExitCode::input_error));
+  EXPECT_NE(read("err").find("too many to search; --sample chooses one"), std::string::npos) << read("err");
+}
+
 TEST_F(ReplayCli, ShowsASampleOfAFile) {
   write("c.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e","samples_per_ray":50,
       "matrix":{"estimator":"ratio","medium":"cosine","rays":"single"}}]})");
