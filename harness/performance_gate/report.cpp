@@ -146,13 +146,11 @@ std::string performance_text(const PerformanceReport& report) {
 }
 
 std::string performance_markdown(const PerformanceReport& report) {
-  std::string text = fmt::format("### nullmark gate: {}\n\n{} against {}: **{}**.\n\n", report.name, report.after, report.before,
-                                 conclusion(report));
-  for (const std::string& line : totals(report)) text += fmt::format("- {}\n", line);
-  for (const std::string& note : report.notes) text += fmt::format("- {}\n", note);
-  for (const std::string& line : left_out(report)) text += fmt::format("- {}\n", line);
-  for (const std::string& line : missing(report)) text += fmt::format("- {}\n", line);
-  if (const std::string line = remedy(report); !line.empty()) text += fmt::format("- {}\n", line);
+  std::string text = fmt::format("### nullmark gate: {}\n\n{} against {}: **{}**.\n\n", markdown_cell(report.name),
+                                 markdown_cell(report.after), markdown_cell(report.before), conclusion(report));
+  for (const auto& lines : {totals(report), report.notes, left_out(report), missing(report)})
+    for (const std::string& line : lines) text += fmt::format("- {}\n", markdown_cell(line));
+  if (const std::string line = remedy(report); !line.empty()) text += fmt::format("- {}\n", markdown_cell(line));
   const auto table = [&](const std::vector<const GateRow*>& rows) {
     std::string result;
     for (const std::string& word : kHeading) result += fmt::format("| {} ", word);

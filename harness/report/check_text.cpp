@@ -174,8 +174,8 @@ std::string summary_text(const RunRecord& run, const Summary& summary, bool all)
 }
 
 std::string summary_markdown(const RunRecord& run, const Summary& summary, const std::string& file) {
-  std::string text =
-      fmt::format("### nullmark check: {}\n\n{}; {}.\n", markdown_cell(run.name), counts(run, summary), families(run));
+  std::string text = fmt::format("### nullmark check: {}\n\n{}; {}.\n", markdown_cell(run.name), counts(run, summary),
+                                 markdown_cell(families(run)));
   for (const std::string& line : remarks_of(run, summary)) text += fmt::format("- {}\n", markdown_cell(line));
   const auto table = [&](std::initializer_list<Kind> kinds, const std::string& title, bool commands) {
     // GitHub shows no summary above 1 MiB.

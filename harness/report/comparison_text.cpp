@@ -187,7 +187,7 @@ std::string compare_markdown(const std::vector<RunRecord>& runs, const std::stri
       if (!line.empty()) text += markdown_cell(line) + "\n";
     if (paired && !comparison.pairings.empty()) text += markdown_table(pairs(comparison)) + "\n";
     if (paired && !comparison.unpaired.empty()) text += markdown_cell(not_paired(comparison)) + "\n";
-    text += baseline_line(comparison) + "\n\n";
+    text += markdown_cell(baseline_line(comparison)) + "\n\n";
   }
   for (const RunRecord& run : runs)
     for (const auto& [title, lines] : configured_tables(run))

@@ -3,7 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <map>
+#include <set>
+
 #include "harness/io/results_json.h"
+#include "harness/io/spec_json.h"
+#include "harness/model/cost.h"
 #include "harness/model/metrics.h"
 #include "harness/model/names.h"
 #include "harness/report/junit.h"
@@ -81,12 +86,29 @@ std::string csv_field(const std::string& text) {
 std::string csv_number(const std::optional<Real>& number) { return number ? fmt::format("{}", *number) : ""; }
 
 /// Heading and content of a row, in order.
-using Row = std::vector<std::pair<const char*, std::string>>;
+using Row = std::vector<std::pair<std::string, std::string>>;
+
+/// Of the components of a cell, by `estimator.NAME`, `medium.NAME`, `majorant.NAME` and `rays.NAME`.
+std::map<std::string, std::string> csv_parameters(const CellRecord& record) {
+  std::map<std::string, std::string> parameters;
+  for (const auto& [part, component] : {std::pair<const char*, const Component&>("estimator", record.cell.estimator),
+                                        {"medium", record.medium.field},
+                                        {"majorant", record.majorant},
+                                        {"rays", record.ray_set}}) {
+    const Json json = parameters_json(component.values);
+    for (const auto& [name, value] : json.items())
+      parameters[fmt::format("{}.{}", part, name)] = value.is_string() ? value.get<std::string>() : value.dump();
+  }
+  return parameters;
+}
 
 Row csv_row(const CellRecord& record, std::size_t c) {
   const Cell& cell = record.cell;
   const ChannelRecord channel = c < record.channel.size() ? record.channel[c] : ChannelRecord{};
   const bool sampled = c < record.channel.size();
+  const std::optional<Cost> cost = cost_of(record);
+  const std::optional<Interval> seconds = cost ? seconds_to(*cost, 0.01) : std::nullopt;
+  const auto end_of_seconds = [&](Real Interval::*end) { return seconds ? csv_number((*seconds).*end) : std::string(); };
   return {{"id", cell.id},
           {"name", cell.name},
           {"experiment", cell.experiment},
@@ -124,6 +146,10 @@ Row csv_row(const CellRecord& record, std::size_t c) {
           {"ns_per_lookup", csv_number(metric(record, "ns_per_lookup"))},
           {"variance_x_lookups", csv_number(sampled ? variance_x_lookups(record, c) : std::nullopt)},
           {"variance_x_ns", csv_number(sampled ? variance_x_ns(record, c) : std::nullopt)},
+          {"seconds_to_1_percent", end_of_seconds(&Interval::value)},
+          {"seconds_to_1_percent_low", end_of_seconds(&Interval::low)},
+          {"seconds_to_1_percent_high", end_of_seconds(&Interval::high)},
+          {"claims", record.claims},
           {"verdict", verdict_word(kind_of(record))},
           {"marks", fmt::format("{}", fmt::join(mark_texts(record), ", "))},
           {"finding", finding_of(record)}};
@@ -133,12 +159,22 @@ std::string csv(const RunRecord& run) {
   std::string text;
   const auto add_line = [&](const Row& row, bool heading) {
     for (std::size_t i = 0; i < row.size(); ++i)
-      text += fmt::format("{}{}", i > 0 ? "," : "", csv_field(heading ? std::string(row[i].first) : row[i].second));
+      text += fmt::format("{}{}", i > 0 ? "," : "", csv_field(heading ? row[i].first : row[i].second));
     text += "\r\n";
   };
-  add_line(csv_row(CellRecord{}, 0), true);
+  std::set<std::string> names;
   for (const CellRecord& record : run.cells)
-    for (std::size_t c = 0; c < static_cast<std::size_t>(record.channels); ++c) add_line(csv_row(record, c), false);
+    for (const auto& [name, value] : csv_parameters(record)) names.insert(name);
+  const auto whole = [&](const CellRecord& record, std::size_t channel) {
+    Row row = csv_row(record, channel);
+    std::map<std::string, std::string> parameters = csv_parameters(record);
+    // The verdict's words stay last.
+    for (const std::string& name : names) row.emplace(row.end() - 3, name, parameters[name]);
+    return row;
+  };
+  add_line(whole(CellRecord{}, 0), true);
+  for (const CellRecord& record : run.cells)
+    for (std::size_t c = 0; c < static_cast<std::size_t>(record.channels); ++c) add_line(whole(record, c), false);
   return text;
 }
 

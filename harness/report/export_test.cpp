@@ -48,6 +48,22 @@ TEST(Export, CsvHasARowPerCellAndChannelAndQuotesWhatNeedsIt) {
   EXPECT_NE(text.find("\"layers/values:1,2,3/lo:-1,0,0/spectrum:1,2,4\""), std::string::npos) << text;
 }
 
+TEST(Export, CsvHasAColumnForEveryParameter) {
+  RunRecord run = example_results();
+  run.cells.resize(2);
+  run.cells[0].cell.estimator.values = {{"control", std::string("average")}, {"factor", Real{0.5}}};
+  run.cells[1].cell.estimator.values = {{"steps", 8}};
+  run.cells[1].medium.field.values = {{"lo", std::array<Real, 3>{-1, 0, 0}}};
+  std::istringstream lines(export_results(run, "csv", "r.json"));
+  std::string heading, row;
+  std::getline(lines, heading);
+  for (const char* name :
+       {",estimator.control,estimator.factor,estimator.steps,", ",medium.lo", ",seconds_to_1_percent_low,", ",claims,"})
+    EXPECT_NE(heading.find(name), std::string::npos) << name << " in " << heading;
+  std::getline(lines, row);
+  EXPECT_NE(row.find(",average,0.5,,"), std::string::npos) << row;
+}
+
 TEST(Export, JsonLinesAreTheCells) {
   const RunRecord run = example_results();
   std::istringstream lines(export_results(run, "jsonl", "r.json"));
