@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <map>
+#include <regex>
+#include <string>
 
 #include "harness/analysis/check.h"
 #include "harness/config/config.h"
@@ -39,6 +42,43 @@ TEST(Guide, EverySentenceIsBorneOutByTheCommittedResults) {
     EXPECT_EQ(words.at(claim.id), ClaimOutcome::reproduced) << claim.id;
   }
   EXPECT_GE(sentences, 9u);
+}
+
+/// Whether a file, a claim or a test of that name exists.
+bool exists(const std::string& name, const std::map<std::string, ClaimOutcome>& claims, const std::string& tests) {
+  if (name.find('/') != std::string::npos) return std::filesystem::exists(in_tree(name));
+  const std::size_t dot = name.find('.');
+  if (dot == std::string::npos) return claims.contains(name);
+  return tests.find(fmt::format("({}, {})", name.substr(0, dot), name.substr(dot + 1))) != std::string::npos;
+}
+
+TEST(Guide, EveryRowOfTheSeedsNamesWhatShowsIt) {
+  std::map<std::string, ClaimOutcome> claims;
+  std::string tests;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(in_tree("configs"))) {
+    if (entry.path().extension() != ".json") continue;
+    const Json config = Json::parse(read_file(entry.path()));
+    if (const auto list = config.find("claims"); list != config.end())
+      for (const Json& claim : *list) claims[claim.at("id")] = {};
+  }
+  for (const char* folder : {"media", "estimators", "harness"})
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(in_tree(folder)))
+      if (entry.path().string().ends_with("_test.cpp")) tests += read_file(entry.path());
+  std::map<std::string, int> rows;
+  const std::string table = read_file(in_tree("configs/seeds.md"));
+  const std::regex row(R"(\| (\d+) \| [^|\n]+ \| (works|partly|missing) \| ([^|\n]+) \|)"), name("`([^`]+)`");
+  for (std::sregex_iterator i(table.begin(), table.end(), row), end; i != end; ++i) {
+    const std::string where = (*i)[3];
+    EXPECT_EQ(++rows["all"], std::stoi((*i)[1]));
+    ++rows[(*i)[2]];
+    std::sregex_iterator named(where.begin(), where.end(), name);
+    EXPECT_TRUE((*i)[2] == "missing" || named != end) << (*i)[0];
+    for (; named != end; ++named) EXPECT_TRUE(exists((*named)[1], claims, tests)) << (*i)[0] << ": " << (*named)[1];
+  }
+  EXPECT_NE(table.find(fmt::format("Of {} rows, {} work, {} work partly and {} are missing.", rows["all"], rows["works"],
+                                   rows["partly"], rows["missing"])),
+            std::string::npos);
+  EXPECT_EQ(rows["all"], 83);
 }
 
 TEST(Guide, TheCommittedResultsAreThoseOfTheConfigurations) {
