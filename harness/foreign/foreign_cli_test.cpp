@@ -109,6 +109,9 @@ TEST_F(ForeignProgram, ProveTriesATrackerOfALibrary) {
 }
 
 TEST_F(ForeignProgram, ACrashInsideTheProgramNamesItsCell) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers tell of crashes themselves";
+#endif
   configure(library(NULLMARK_TRACKERS_LIBRARY, "ratio", R"("parameters":{"fault":"crashes"})"));
   EXPECT_EQ(run("run c.json -o r.json --allow-foreign"), 128 + SIGSEGV);
   EXPECT_NE(read("err").find("crashed (signal 11) in cell"), std::string::npos) << read("err");

@@ -105,6 +105,9 @@ TEST(Planted, MeansAreAsWrongAsStated) {
   for (const PlantedScene& scene : kPlantedScenes) {
     SCOPED_TRACE(scene.name);
     const CellRecord record = run(scene);
+    const bool has_mean = std::string_view(scene.name) != "planted_nan";
+    EXPECT_EQ(record.status, has_mean ? Status::ok : Status::error) << record.reason;
+    if (!has_mean) continue;
     const ChannelRecord& channel = record.channel.at(0);
     const Real noise = std::sqrt(*channel.variance / (static_cast<Real>(record.samples) * scene.fresh));
     const Real stated = scene.relative_bias * *channel.reference;
@@ -112,7 +115,6 @@ TEST(Planted, MeansAreAsWrongAsStated) {
     if (scene.relative_bias != 0) {
       EXPECT_GT(std::abs(*channel.bias), 6 * noise);
     }
-    EXPECT_EQ(record.status, std::string_view(scene.name) == "planted_nan" ? Status::error : Status::ok) << record.reason;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -74,8 +75,9 @@ void bet(Evidence& evidence, const MeanTest& test, const SummedErrors& errors, s
     evidence.bet(test, test.sum_lengths[0], sums);
     for (std::size_t level = 1; level < test.sum_lengths.size(); ++level) {
       const auto of = static_cast<std::size_t>(test.sum_lengths[level] / test.sum_lengths[level - 1]);
-      longer.assign(sums.size() / of, 0);
-      for (std::size_t i = 0; i < sums.size(); ++i) longer[i / of] += sums[i];
+      longer.clear();
+      for (auto sum = sums.begin(); sum != sums.end(); sum += static_cast<std::ptrdiff_t>(of))
+        longer.push_back(std::accumulate(sum, sum + static_cast<std::ptrdiff_t>(of), Real{0}));
       sums = longer;
       evidence.bet(test, test.sum_lengths[level], sums);
     }
