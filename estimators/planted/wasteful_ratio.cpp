@@ -35,7 +35,7 @@ struct WastefulRatioTracking : RatioTracking<Value> {
 
   void init(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
     RatioTracking<Value>::init(walk, ray, flight, rng);
-    constexpr bool chromatic = std::is_same_v<Value, Spectrum>;
+    constexpr bool chromatic = kIsChromatic<Value>;
     constexpr Real deep = 20;
     Waste::spin(ray.majorant.total_depth() > deep ? kWaste.deep : chromatic ? kWaste.chromatic : kWaste.grey);
   }
