@@ -84,8 +84,8 @@ void add(const std::string& profile, void (*baseline)(benchmark::State&, Real), 
 [[maybe_unused]] const BenchmarkGroup kGroup([] {
   benchmark::RegisterBenchmark("least step/0 random number, std::log, advance", floor);
   for (const Real lookups : {5., 30.}) {
-    add("constant", plain_constant, lookups, make_medium({"homogeneous", {{"extinction", lookups / 2}}, {}, {}})->build());
     const auto grey = make_medium({"homogeneous", {{"extinction", lookups / 2}}, {}, {}})->build();
+    add("constant", plain_constant, lookups, grey);
     add("4 channels, constant", plain_colours, lookups,
         std::make_shared<Spectral>(grey, std::vector<Real>(kSpectrum.begin(), kSpectrum.end())));
     add("Gaussian", plain_gaussian, lookups, make_medium({"gaussian_bump", {{"amplitude", lookups}}, {}, {}})->build());

@@ -91,7 +91,7 @@ class Flight {
 };
 
 /// (mub - mu)/mub where the walk is: the weight of a null collision.  At most 1, 0 where the majorant is tight, negative where it
-/// is violated.  By the inverse rate that the flight has: a division in each step would cost as much as a random number.
+/// is violated.  It multiplies by the inverse rate, which the flight knows, because a division takes as long as a random number.
 template <class Value>
 Value null_ratio(const auto& at, const Value& extinction) {
   return (at.rate() - extinction) * at.inverse_rate();

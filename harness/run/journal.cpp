@@ -151,14 +151,14 @@ void Journal::write_head(const std::string& config_hash) {
   make_durable(file_, path_);
 }
 
-/// Refuses a file of that name that no run has left, which is not to be emptied.
+/// Refuses a file that no run has left: opening a journal may empty it.
 void Journal::expect_own(const std::string& text, const std::string& config_hash) const {
   constexpr std::size_t kBeginning = 8;
   const std::size_t told = std::min(kBeginning, text.size());
   const std::string_view beginning = std::string_view(text).substr(0, told);
   // After a power cut, unsynced bytes may read as zeros.
   if (beginning != head(config_hash).substr(0, told) && beginning.find('\0') == std::string_view::npos)
-    throw InputError(path_ + ": is not the journal of a run, which needs this name; move the file, or give another -o");
+    throw InputError(path_ + ": is not the journal of a run; move the file, or give another -o");
 }
 
 void Journal::append(const CellRecord& record) {

@@ -31,6 +31,7 @@ auto located(const std::string& pointer, F&& f) {
 constexpr Real kDeepestSingle = 1 << 14;
 /// Of a medium from its frame's origin, in its own sizes: its inside is still told to 2^-14.
 constexpr Real kFarthestSingle = 1 << 10, kFarthestDouble = 0x1p39;
+/// Of the end of a ray from its origin, in sizes of the medium.
 constexpr Real kFarthestRaySingle = 1 << 14, kFarthestRayDouble = 0x1p43;
 
 /// What a tracker throws is its cell's failure; a mistake in the configuration and a lack of memory are not.

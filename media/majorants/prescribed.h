@@ -21,7 +21,7 @@ class PrescribedMajorant final : public MajorantStructure {
                    corner & 4 ? box.hi.z() : box.lo.z());
       // Products of smaller rates underflow.
       constexpr Real kLeast = 1e-300;
-      if (const Real rate = value + gradient.dot(to_world * p); !(rate > 0) || rate < kLeast)
+      if (const Real rate = value + gradient.dot(to_world * p); !(rate >= kLeast))
         throw ParameterError(gradient.isZero() ? "value" : "gradient",
                              "the majorant falls to " + std::to_string(rate) +
                                  " at a corner of the medium; expected a rate above 0 everywhere, and at least 1e-300");
