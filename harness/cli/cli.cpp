@@ -20,6 +20,7 @@
 #include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
+#include "harness/io/text.h"
 #include "harness/model/program_name.h"
 #include "harness/performance_gate/required.h"
 #include "harness/registry/estimator_entry.h"
@@ -36,12 +37,6 @@
 
 namespace nullmark {
 namespace {
-
-/// Messages quote what users wrote, line breaks included.
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
 
 /// Text to a file, or to standard output for "" and "-".
 void deliver(const std::string& text, const std::string& output) {
@@ -182,7 +177,7 @@ class CommandLine {
 
   void add_check() {
     CLI::App* command = add("check", "Print verdicts on bias and expected lookups, derived from the results file alone", [this] {
-      refuse_overwriting({file_}, {junit_, markdown_});
+      refuse_overwriting_data({file_}, {junit_, markdown_});
       RunRecord run = load_all({file_})[0];
       const Summary summary = summarise(run, strict_);
       if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
@@ -207,7 +202,7 @@ class CommandLine {
 
   void add_compare() {
     CLI::App* command = add("compare", "Rank estimators by what accuracy costs in time", [this] {
-      refuse_overwriting(files_, {markdown_});
+      refuse_overwriting_data(files_, {markdown_});
       const std::vector<RunRecord> runs = load_all(files_);
       const std::string ranking = compare_text(runs, baseline_, paired_);
       if (ranking.empty()) return report(ExitCode::nothing_ran, "no cell of these results was sampled; nothing to compare");
@@ -284,7 +279,7 @@ class CommandLine {
   void add_export() {
     CLI::App* command = add("export", "Write results in another program's format", [this] {
       expect_one_of(format_, export_formats(), "format");
-      refuse_overwriting({file_}, {output_});
+      refuse_overwriting_data({file_}, {output_});
       RunRecord run = load_all({file_})[0];
       summarise(run);
       deliver(export_results(run, format_, file_), output_);
@@ -298,8 +293,7 @@ class CommandLine {
   void add_merge() {
     CLI::App* command = add("merge", "Join the results of shards", [this] {
       refuse_overwriting(files_, {output_});
-      if (!force_ && output_ != "-" && std::filesystem::exists(output_))
-        throw InputError(output_ + ": exists; --force replaces it");
+      expect_new(output_, force_);
       deliver(results_text(merge_results(load_all(files_), files_, builds_of(builds_))), output_);
       return ExitCode::ok;
     });
@@ -311,9 +305,8 @@ class CommandLine {
 
   void add_make_volume() {
     CLI::App* command = add("make-volume", "Write a procedural smoke volume (OpenVDB, grid \"density\")", [this] {
-      if (!force_ && std::filesystem::exists(file_)) throw InputError(file_ + ": exists; --force replaces it");
-      expect_replaceable(file_);
-      if (std::filesystem::is_symlink(file_)) throw InputError(file_ + ": is a link; give the path of the file");
+      expect_new(file_, force_);
+      expect_plain_or_none(file_);
       write_procedural_vdb(file_, volume_);
       return ExitCode::ok;
     });

@@ -31,7 +31,7 @@ struct ProveCommand {
   std::string medium;     ///< likewise; empty: those of the battery
   std::string output;     ///< results file; empty: none
   int threads = 0;
-  bool quick = false;
+  bool quick = false, force = false;
   bool allow_foreign = false;
   std::vector<std::string> command_line;
 };
@@ -52,6 +52,7 @@ struct JudgeCommand {
   std::string scene;             ///< id; empty: the only one
   std::string output;            ///< results file; empty: none
   bool correlated = false;       ///< the rays of a row share random numbers
+  bool force = false;
   std::vector<std::string> command_line;
 };
 ExitCode judge_command(const JudgeCommand& command);

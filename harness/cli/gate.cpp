@@ -74,7 +74,7 @@ ExitCode update(const GateCommand& command, const Counts& fresh, std::optional<R
 }  // namespace
 
 ExitCode gate_command(const GateCommand& command) {
-  refuse_overwriting({command.results, command.baseline, command.blocks}, {command.junit, command.markdown});
+  refuse_overwriting_data({command.results, command.baseline, command.blocks}, {command.junit, command.markdown});
   const std::optional<std::vector<Tier>> required = required_tiers(command);
   const Counts fresh = read_counts(command.results);
   std::optional<Real> threshold;

@@ -82,6 +82,23 @@ TEST(Hostile, ExperimentsThatAddUpAreRefused) {
       "c.json: /experiments/1: with the experiments before it, it makes more than 100000 cells; split them into several files");
 }
 
+/// Nor one file alone.
+TEST(Hostile, FilesThatAddUpAreRefused) {
+  const auto file = [](const char* name) {
+    return ConfigSource{
+        R"({"nullmark":"config/2","experiments":[{"name":")" + std::string(name) +
+            R"(","rays":"single","samples_per_ray":1,"matrix":{"estimator":"ratio","medium":{"type":"linear","begin":)" +
+            sweep(240) + R"(,"end":)" + sweep(240) + "}}}]}",
+        std::string(name) + ".json"};
+  };
+  try {
+    read_configs({file("a"), file("b")});
+    ADD_FAILURE() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "b.json: with the files before it, it makes more than 100000 cells; run them one by one");
+  }
+}
+
 /// Seconds, not hours, for as many as are allowed.
 TEST(Hostile, ManyCellsAreExpandedInLinearTime) {
   const std::string text =
@@ -160,6 +177,89 @@ TEST_F(HostileFiles, NamesDoNotReachTheTerminalAsCommands) {
   const std::string summary = read("m.md");
   EXPECT_EQ(summary.find("<script"), std::string::npos) << summary;
   EXPECT_EQ(summary.find('\x1b'), std::string::npos) << summary;
+}
+
+/// As names are shown they are selected, and a name is one line wherever it stands.
+TEST_F(HostileFiles, NamesAreOneLineAndSelectTheirCells) {
+  write("c.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"a\nPASS\u202eb","rays":"single",
+    "samples_per_ray":64,"matrix":{"estimator":"ratio","medium":"linear"}},{"name":"b","rays":"single",
+    "samples_per_ray":64,"matrix":{"estimator":"ratio","medium":"linear"}}]})");
+  ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");
+  const std::string name = results("r.json").cells.at(0).cell.name;
+  EXPECT_EQ(name, "a\\x0aPASS\\u202eb/ratio/linear/global");
+  EXPECT_EQ(read("out").find("\nPASS"), std::string::npos) << read("out");
+  EXPECT_EQ(run("replay r.json '" + name + "'"), 0) << read("err");
+  run("check r.json --markdown m.md --all");
+  EXPECT_EQ(read("out").find("\nPASS"), std::string::npos) << read("out");
+  // Of a file that somebody else made.
+  std::string text = read("r.json");
+  for (std::size_t at = text.find("\\\\x0a"); at != std::string::npos; at = text.find("\\\\x0a", at)) text.replace(at, 5, "\\n");
+  write("s.json", text);
+  for (const char* command : {"check s.json --all", "compare s.json"}) {
+    run(command);
+    EXPECT_EQ(read("out").find("\nPASS"), std::string::npos) << command << ": " << read("out");
+  }
+}
+
+/// A message that quotes a megabyte hides its remedy.
+TEST_F(HostileFiles, MessagesAreShort) {
+  const std::string much(1'000'000, '7');
+  for (const std::string& text :
+       {R"({"nullmark":"config/2","name":)" + much + "}", R"({"nullmark":"config/2",")" + much + R"(":1,"experiments":[]})",
+        config(R"("linear")", R"("samples_per_ray":1,")" + much + R"(":1)"), config("\"" + much + "\"", R"("samples_per_ray":1)"),
+        config(R"({"type":"vdb","file":")" + much + "\"}", R"("samples_per_ray":1)")}) {
+    write("c.json", text);
+    EXPECT_EQ(run("run c.json -o r.json"), static_cast<int>(ExitCode::input_error));
+    EXPECT_LE(read("err").size(), 2100u);
+    EXPECT_EQ(read("err").find('\n'), read("err").size() - 1);
+  }
+  EXPECT_EQ(run("run c.json -o r.json --filter " + std::string(900, '(')), static_cast<int>(ExitCode::input_error));
+}
+
+/// A byte of value 0 does not end the message.
+TEST_F(HostileFiles, ZeroesInNamesDoNotCutTheMessage) {
+  write("c.json", config(R"("lin\u0000ear")", R"("samples_per_ray":1)"));
+  EXPECT_EQ(run("run c.json"), static_cast<int>(ExitCode::input_error));
+  EXPECT_NE(read("err").find(R"(unknown medium "lin\x00ear"; did you mean "linear"?)"), std::string::npos) << read("err");
+}
+
+/// Only what a command can make again is replaced unasked, and nothing else by it.
+TEST_F(HostileFiles, OutputsReplaceOnlyTheirKind) {
+  write("c.json", config(R"("linear")", R"("samples_per_ray":64)"));
+  ASSERT_EQ(run("run c.json -o r.json --no-timing"), 0) << read("err");
+  ASSERT_EQ(run("make-volume v.vdb --resolution 8"), 0) << read("err");
+  const std::string kept = read("r.json"), config_text = read("c.json"), volume = read("v.vdb");
+  write("other.json", kept);
+  for (const char* output : {"other.json", "c.json", "v.vdb"})
+    for (const std::string& command :
+         {fmt::format("report r.json -o {}", output), fmt::format("export r.json --format csv -o {}", output),
+          fmt::format("export r.json --format jsonl -o {}", output), fmt::format("check r.json --junit {}", output),
+          fmt::format("check r.json --markdown {}", output), fmt::format("compare r.json --markdown {}", output)}) {
+      EXPECT_EQ(run(command), static_cast<int>(ExitCode::input_error)) << command;
+      EXPECT_NE(read("err").find("which this output would replace; give the output another path"), std::string::npos)
+          << command << ": " << read("err");
+    }
+  EXPECT_EQ(read("other.json"), kept);
+  EXPECT_EQ(read("c.json"), config_text);
+  EXPECT_EQ(read("v.vdb"), volume);
+  for (int again = 0; again < 2; ++again)
+    for (const char* command :
+         {"report r.json -o p.html", "export r.json --format csv -o e.csv", "export r.json --format jsonl -o e.jsonl",
+          "export r.json --format google-benchmark -o e.json", "export r.json --format junit -o e.xml"})
+      EXPECT_EQ(run(command), 0) << command << ": " << read("err");
+  EXPECT_EQ(run("prove ratio --medium linear --quick -o other.json"), static_cast<int>(ExitCode::input_error));
+  EXPECT_EQ(read("err"), "nullmark: other.json: exists; --force replaces it\n");
+  EXPECT_EQ(read("other.json"), kept);
+}
+
+/// What is larger than any configuration is refused before it is parsed.
+TEST_F(HostileFiles, ConfigurationsAreNoLargerThanTheirCellsNeed) {
+  const std::string whole = config(R"("linear")", R"("samples_per_ray":1)");
+  write("c.json", whole + std::string(std::size_t{65} << 20, ' '));
+  EXPECT_EQ(run("run c.json --dry-run"), static_cast<int>(ExitCode::input_error));
+  EXPECT_EQ(read("err"), "nullmark: c.json: holds more than 64 MiB; expected a configuration\n");
+  EXPECT_EQ(run("run - --dry-run", NULLMARK_PROGRAM, "c.json"), static_cast<int>(ExitCode::input_error));
+  EXPECT_EQ(read("err"), "nullmark: <stdin>: holds more than 64 MiB; expected a configuration\n");
 }
 
 /// Root may read everything, so the program runs without that right.

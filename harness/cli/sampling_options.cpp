@@ -52,7 +52,8 @@ void declare_prove(CLI::App& command, ProveCommand& asked) {
   add_consent(command, asked.allow_foreign);
   command.add_flag("--quick", asked.quick, "An eighth of the samples and fewer media");
   command.add_option("--threads", asked.threads, "Number of threads; 0: all cores")->check(CLI::Range(0, 4096));
-  command.add_option("-o,--output", asked.output, "Also write the results, for check and replay; replaces an existing file");
+  command.add_option("-o,--output", asked.output, "Also write the results, for check and replay");
+  command.add_flag("--force", asked.force, "Replace existing results");
 }
 
 void declare_problem(CLI::App& command, ProblemCommand& asked) {
@@ -71,7 +72,8 @@ void declare_judge(CLI::App& command, JudgeCommand& asked) {
   command.add_flag("--correlated", asked.correlated,
                    "The rays of one row share random numbers: judge means over rays, as of images");
   command.add_option("--scene", asked.scene, "Id of the scene; may be left out if there is one");
-  command.add_option("-o,--output", asked.output, "Also write the results, for check and report; replaces an existing file");
+  command.add_option("-o,--output", asked.output, "Also write the results, for check and report");
+  command.add_flag("--force", asked.force, "Replace existing results");
 }
 
 void declare_replay(CLI::App& command, ReplayCommand& asked) {

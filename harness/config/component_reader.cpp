@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/io/text.h"
 #include "harness/io/transport_json.h"
 
 namespace nullmark {
@@ -171,7 +172,7 @@ std::vector<Component> read_given(ComponentKind kind, const JsonNode& node, cons
 void complete(ComponentKind kind, Component& component) {
   const std::vector<ParameterInfo> parameters = parameters_of(kind, component.type);
   for (const ParameterInfo& parameter : parameters) component.values.emplace(parameter.name, parameter.default_value);
-  component.label = make_label(component.type, component.values, parameters);
+  component.label = printable(make_label(component.type, component.values, parameters));
 }
 
 void complete(MediumSpec& medium);

@@ -19,6 +19,7 @@
 #include "harness/io/spec_fields.h"
 #include "harness/io/spec_json.h"
 #include "harness/io/tables_json.h"
+#include "harness/io/text.h"
 
 namespace nullmark {
 namespace {
@@ -102,7 +103,7 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
       {"$schema", kVersionKey, "name", "seed", "timing", "error_rates", "experiments", "tables", "claims", "credits"});
 
   plan.file = source.file;
-  plan.name = top.has("name") ? top["name"].string() : std::filesystem::path(source.file).stem().string();
+  plan.name = top.has("name") ? printable(top["name"].string()) : std::filesystem::path(source.file).stem().string();
   if (top.has("timing")) plan.timing = read_closed<TimingPlan>(top["timing"]);
   if (top.has("error_rates")) plan.error_rates = read_closed<ErrorRates>(top["error_rates"]);
   std::uint64_t own_seed = 1;
@@ -121,7 +122,7 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
     if (plan.cells.size() > kMostCells)
       entry.fail(
           fmt::format("with the experiments before it, it makes more than {} cells; split them into several files", kMostCells));
-    const std::string name = entry["name"].string();
+    const std::string name = printable(entry["name"].string());
     if (std::find(experiments.begin(), experiments.end(), name) != experiments.end())
       entry["name"].fail(fmt::format("\"{}\" is the name of an earlier experiment; expected another", name));
     experiments.push_back(name);
@@ -185,6 +186,9 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
       throw InputError(fmt::format("{}: /error_rates: differs from that of {}; expected the same, or run the files one by one",
                                    file.file, files.front().file));
     for (const ConfiguredCell& configured : file.cells) builder.add(configured);
+    if (plan.cells.size() > kMostCells)
+      throw InputError(
+          fmt::format("{}: with the files before it, it makes more than {} cells; run them one by one", file.file, kMostCells));
     plan.credits.insert(file.credits.begin(), file.credits.end());
   }
   name_cells(plan);
@@ -204,10 +208,10 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
 std::vector<ConfigSource> load_configs(const std::vector<std::string>& paths) {
   namespace fs = std::filesystem;
   std::vector<ConfigSource> sources;
-  const auto load = [&](const fs::path& path) { sources.push_back({read_file(path.string()), path.string()}); };
+  const auto load = [&](const fs::path& path) { sources.push_back({read_file(path.string(), kLargestConfig), path.string()}); };
   for (const std::string& path : paths) {
     if (path == "-") {
-      sources.push_back({read_stream(std::cin, "<stdin>"), "<stdin>"});
+      sources.push_back({read_stream(std::cin, "<stdin>", kLargestConfig), "<stdin>"});
     } else if (fs::is_directory(path)) {
       std::vector<fs::path> files;
       for (const auto& entry : fs::directory_iterator(path))

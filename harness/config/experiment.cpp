@@ -9,6 +9,7 @@
 
 #include "harness/config/component_reader.h"
 #include "harness/io/spec_json.h"
+#include "harness/io/text.h"
 
 namespace nullmark {
 namespace {
@@ -160,7 +161,7 @@ std::vector<ConfiguredCell> read_experiment(const JsonNode& node, std::uint64_t 
   node.expect_keys(cell_keys({"name", "matrix", "zip", "exclude", "include", "constraints"}));
   refuse_two_sample_counts(node);
   ConfiguredCell base;
-  base.experiment = base.cell.experiment = node["name"].string();
+  base.experiment = base.cell.experiment = printable(node["name"].string());
   if (base.experiment.empty()) node["name"].expected("a name that is not empty");
   base.cell.seed = seed;
   static const Json kGlobal = "global";

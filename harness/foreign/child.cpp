@@ -14,7 +14,7 @@
 #include <cstring>
 #include <thread>
 
-#include "harness/foreign/printable.h"
+#include "harness/foreign/ascii_line.h"
 #include "harness/foreign/spawner.h"
 #include "media/base/parameters.h"
 
@@ -73,7 +73,7 @@ void Child::start() {
   if (result.error != 0) {
     process_ = -1;
     throw ParameterError(
-        "command", fmt::format("\"{}\" cannot be started: {}", printable(spec_.command.front()), std::strerror(result.error)));
+        "command", fmt::format("\"{}\" cannot be started: {}", ascii_line(spec_.command.front()), std::strerror(result.error)));
   }
 }
 
@@ -135,7 +135,7 @@ std::string Child::ending() {
 void Child::fail(const std::string& message) {
   std::string text = message + (process_ > 0 ? ending() : "");
   if (!line_.empty()) last_line_ = line_;
-  if (!last_line_.empty()) text += fmt::format("; the last line of its standard error: {}", printable(last_line_));
+  if (!last_line_.empty()) text += fmt::format("; the last line of its standard error: {}", ascii_line(last_line_));
   kill();
   throw TrackerFailure(text);
 }
@@ -251,7 +251,7 @@ Child::Frame Child::receive(std::size_t most_bytes) {
   }
   if (header.kind == FrameKind::failed) {
     const std::string said(reinterpret_cast<const char*>(payload_.data()), payload_.size());
-    throw TrackerFailure("the tracker failed: " + printable(said));
+    throw TrackerFailure("the tracker failed: " + ascii_line(said));
   }
   return {header.kind, payload_};
 }

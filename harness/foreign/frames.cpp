@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "harness/foreign/printable.h"
+#include "harness/foreign/ascii_line.h"
 #include "harness/io/json_input.h"
 #include "harness/model/names.h"
 
@@ -31,12 +31,12 @@ SampleRange read_range(const JsonNode& node) {
 }
 
 bool flag(const JsonNode& node, const char* key) { return node.has(key) && node[key].boolean(); }
-std::string text(const JsonNode& node, const char* key) { return node.has(key) ? printable(node[key].string()) : ""; }
+std::string text(const JsonNode& node, const char* key) { return node.has(key) ? ascii_line(node[key].string()) : ""; }
 
 Welcome read_welcome_json(const JsonNode& node) {
   node.expect_object();
   Welcome welcome;
-  welcome.name = printable(node["name"].string());
+  welcome.name = ascii_line(node["name"].string());
   welcome.summary = text(node, "summary");
   welcome.source = text(node, "source");
   welcome.version = text(node, "version");
@@ -147,7 +147,7 @@ Welcome read_welcome(std::span<const std::byte> payload) {
   try {
     return read_welcome_json(JsonNode(parse_json(reader.text(), "welcome"), "welcome"));
   } catch (const InputError& error) {
-    refuse_frame(printable(error.what()));
+    refuse_frame(ascii_line(error.what()));
   }
 }
 

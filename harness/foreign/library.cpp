@@ -19,8 +19,8 @@
 #include <xmmintrin.h>
 #endif
 
+#include "harness/foreign/ascii_line.h"
 #include "harness/foreign/content_hash.h"
-#include "harness/foreign/printable.h"
 #include "media/base/parameters.h"
 
 namespace nullmark {
@@ -49,7 +49,7 @@ std::int32_t guarded(const char* what, F&& call) {
   try {
     code = call();
   } catch (const std::exception& error) {
-    throw TrackerFailure(fmt::format("the tracker threw across the C interface in {}: {}", what, printable(error.what())));
+    throw TrackerFailure(fmt::format("the tracker threw across the C interface in {}: {}", what, ascii_line(error.what())));
   } catch (...) {
     throw TrackerFailure(fmt::format("the tracker threw across the C interface in {}", what));
   }
@@ -71,7 +71,7 @@ class ErrorText {
   std::int64_t size() const { return static_cast<std::int64_t>(text_.size()); }
   std::string said() {
     text_.back() = '\0';
-    return text_[0] ? fmt::format(": {}", printable(text_.data())) : "";
+    return text_[0] ? fmt::format(": {}", ascii_line(text_.data())) : "";
   }
 
  private:
@@ -131,7 +131,7 @@ class LibraryTracker final : public ForeignTracker {
  public:
   LibraryTracker(const nullmark_tracker& tracker, std::string parameters, std::uint64_t file_hash)
       : tracker_(tracker), parameters_(std::move(parameters)), describing_(tracker, parameters_) {
-    const auto text = [](const char* told) { return told ? printable(told) : std::string(); };
+    const auto text = [](const char* told) { return told ? ascii_line(told) : std::string(); };
     name = text(tracker.name);
     summary = text(tracker.summary);
     source = text(tracker.source);
@@ -174,7 +174,7 @@ void expect_interface(const std::string& path, const nullmark_tracker& tracker) 
   constexpr std::uint32_t kKnown = NULLMARK_TRANSMITTANCE | NULLMARK_OPTICAL_DEPTH | NULLMARK_FREE_PATH;
   if ((tracker.quantities & kKnown) == 0 || (tracker.quantities & ~kKnown) != 0)
     throw ParameterError("file", fmt::format("{}: found quantities {:#x} of tracker \"{}\"; expected bits of {:#x}", path,
-                                             tracker.quantities, printable(tracker.name), kKnown));
+                                             tracker.quantities, ascii_line(tracker.name), kKnown));
 }
 
 const nullmark_tracker& find(const std::string& path, GetTracker get, const std::string& name) {
@@ -186,7 +186,7 @@ const nullmark_tracker& find(const std::string& path, GetTracker get, const std:
     guarded("nullmark_get_tracker", [&] { return tracker = get(NULLMARK_ABI, i), NULLMARK_OK; });
     if (!tracker) break;
     expect_interface(path, *tracker);
-    names.push_back(printable(tracker->name));
+    names.push_back(ascii_line(tracker->name));
     if (name == tracker->name || (name.empty() && i == 0)) found = tracker;
   }
   if (names.empty())
@@ -221,7 +221,7 @@ std::shared_ptr<const ForeignTracker> open_library(const std::string& path, cons
   }
   if (!handle) {
     const char* const why = ::dlerror();
-    throw ParameterError("file", fmt::format("{}: cannot be loaded: {}", path, why ? printable(why) : "no reason told"));
+    throw ParameterError("file", fmt::format("{}: cannot be loaded: {}", path, why ? ascii_line(why) : "no reason told"));
   }
   const auto get = reinterpret_cast<GetTracker>(::dlsym(handle, "nullmark_get_tracker"));
   if (!get)

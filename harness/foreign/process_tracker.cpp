@@ -10,8 +10,8 @@
 #include <mutex>
 #include <utility>
 
+#include "harness/foreign/ascii_line.h"
 #include "harness/foreign/content_hash.h"
-#include "harness/foreign/printable.h"
 #include "harness/foreign/request_answers.h"
 #include "harness/foreign/serve.h"
 #include "harness/model/hash.h"

@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <mutex>
 
+#include "harness/foreign/ascii_line.h"
 #include "harness/foreign/content_hash.h"
 #include "harness/foreign/foreign_entry.h"
-#include "harness/foreign/printable.h"
 #include "harness/io/json_input.h"
 #include "harness/io/npy.h"
 #include "harness/model/names.h"
@@ -165,7 +165,7 @@ class SamplesSource final : public EstimatorSource {
   /// Nobody counted lookups, and to read a number twice proves nothing.
   std::optional<TrackerIdentity> identity() const override {
     samples();
-    return TrackerIdentity{printable(std::filesystem::path(file_).filename().string()), "", hash_, true, false};
+    return TrackerIdentity{ascii_line(std::filesystem::path(file_).filename().string()), "", hash_, true, false};
   }
 
  private:

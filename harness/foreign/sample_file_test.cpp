@@ -211,6 +211,35 @@ TEST_F(SampleFiles, ProblemsThatCannotBeWrittenAreRefused) {
   EXPECT_NE(read("err").find("nothing to write"), std::string::npos) << read("err");
 }
 
+/// The configuration that was given is to blame, and what was written before the mistake is gone.
+TEST_F(SampleFiles, ProblemsThatFailLeaveNothing) {
+  const auto volume = [](const char* more) {
+    return fmt::format(R"({{"nullmark":"config/2","experiments":[{{"name":"e","rays":"single","samples_per_ray":1,
+        "matrix":{{"estimator":"ratio","medium":["linear",{{"type":"vdb","file":"nowhere.vdb"{}}}]}}}}]}})",
+                       more);
+  };
+  write("c.json", volume(""));
+  EXPECT_EQ(run("problem c.json -o q --resolution 8"), 2);
+  EXPECT_EQ(read("err"),
+            "nullmark: c.json: /experiments/0/matrix/medium/1/file: nowhere.vdb: no such file (grid \"density\"); say "
+            "\"optional\": true "
+            "to leave it out\n");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "q"));
+  write("c.json", volume(R"(,"optional":true)"));
+  EXPECT_EQ(run("problem c.json -o q --resolution 8"), 0);
+  EXPECT_NE(read("err").find("left out: nowhere.vdb: no such file"), std::string::npos) << read("err");
+  EXPECT_EQ(Json::parse(read("q/problem.json"))["scenes"].size(), 1u);
+  // A disk that is full shows only while it is written.
+  std::filesystem::create_directories(folder_ / "empty");
+  for (const char* folder : {"new", "empty"}) {
+    const std::string limited = fmt::format("cd '{}' && ulimit -f 1 && '{}' problem c.json -o {} --resolution 64 >out 2>err",
+                                            folder_.string(), NULLMARK_PROGRAM, folder);
+    EXPECT_NE(WEXITSTATUS(std::system(limited.c_str())), 0);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "new"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "empty"));
+}
+
 TEST_F(SampleFiles, VolumesAreNamedAsTheyAre) {
   ASSERT_EQ(run("make-volume smoke.vdb --resolution 16"), 0) << read("err");
   pose(R"({"type":"vdb","file":"smoke.vdb","extinction_per_value":3})", R"({"type":"orthographic","width":4,"height":4})");

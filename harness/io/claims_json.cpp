@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <set>
 
+#include "harness/io/text.h"
 #include "harness/model/metrics.h"
 
 namespace nullmark {
@@ -120,7 +121,8 @@ void read_claims(const JsonNode& node, const CellReader& finder, std::vector<Pub
   for (const PublishedClaim& earlier : claims) ids.insert(earlier.id);
   for (const JsonNode& entry : node.elements()) {
     entry.expect_keys({"id", "source", "claim", "note", "required", "parts"});
-    PublishedClaim claim{entry["id"].string(), entry["source"].string(), entry["claim"].string(), "", {}};
+    PublishedClaim claim{
+        printable(entry["id"].string()), printable(entry["source"].string()), printable(entry["claim"].string()), "", {}};
     if (entry.has("note")) claim.note = entry["note"].string();
     if (entry.has("required")) claim.required = entry["required"].boolean();
     if (!ids.insert(claim.id).second)

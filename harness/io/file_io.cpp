@@ -39,8 +39,7 @@ fs::path target_of(const std::string& path) {
   return error ? fs::path(path) : target;
 }
 
-/// The largest text that is read, packed or not.
-constexpr std::size_t kLargestText = std::size_t{1} << 30;
+constexpr std::size_t kMebi = std::size_t{1} << 20;
 
 /// Calls visit(part) for all of a packed text.
 template <class Visit>
@@ -51,7 +50,7 @@ void unpack(const std::string& packed, const std::string& path, const Visit& vis
   stream.push(io::array_source(packed.data(), packed.size()));
   // Otherwise what is damaged would only look shorter.
   stream.exceptions(std::ios::badbit);
-  std::vector<char> part(std::size_t{1} << 20);
+  std::vector<char> part(kMebi);
   try {
     while (stream.read(part.data(), static_cast<std::streamsize>(part.size())) || stream.gcount() > 0)
       visit(std::string_view(part.data(), static_cast<std::size_t>(stream.gcount())));
@@ -62,12 +61,20 @@ void unpack(const std::string& packed, const std::string& path, const Visit& vis
   }
 }
 
-std::string unpacked(const std::string& packed, const std::string& path) {
+/// Where a text of so many bytes is more than is read.
+void expect_at_most(std::size_t size, std::size_t most, const std::string& path, const char* does) {
+  if (size <= most * kMebi) return;
+  const std::string largest = most < 1024 ? fmt::format("{} MiB", most) : fmt::format("{} GiB", most / 1024);
+  throw InputError(fmt::format("{}: {} more than {}; expected a {}", path, does, largest,
+                               most < kLargestResults ? "configuration" : "configuration or results"));
+}
+
+std::string unpacked(const std::string& packed, const std::string& path, std::size_t most) {
   // Its size first: a small file may unpack to more than the machine's memory.
   std::size_t size = 0;
   unpack(packed, path, [&](std::string_view part) {
     size += part.size();
-    if (size > kLargestText) throw InputError(path + ": unpacks to more than 1 GiB; expected results of nullmark");
+    expect_at_most(size, most, path, "unpacks to");
   });
   std::string text;
   text.reserve(size);
@@ -77,32 +84,33 @@ std::string unpacked(const std::string& packed, const std::string& path) {
 
 }  // namespace
 
-std::string read_stream(std::istream& in, const std::string& path) {
+std::string read_stream(std::istream& in, const std::string& path, std::size_t most) {
   // Some devices never end.
   constexpr std::size_t kMostOfDevice = std::size_t{1} << 24;
   std::error_code error;
   const bool device = fs::is_character_file(path, error);
   std::string text;
-  std::vector<char> part(std::size_t{1} << 20);
+  // A text that grows takes twice its size.
+  if (const auto size = fs::file_size(path, error); !error && size <= most * kMebi) text.reserve(size);
+  std::vector<char> part(kMebi);
   while (in.read(part.data(), static_cast<std::streamsize>(part.size())) || in.gcount() > 0) {
     text.append(part.data(), static_cast<std::size_t>(in.gcount()));
     if (device && text.size() > kMostOfDevice) throw InputError(path + ": does not end; expected a file");
-    if (text.size() > kLargestText) throw InputError(path + ": holds more than 1 GiB; expected a configuration or results");
+    expect_at_most(text.size(), most, path, "holds");
   }
   return text;
 }
 
-std::string read_file(const std::string& path) {
+std::string read_file(const std::string& path, std::size_t most) {
   std::error_code error;
   if (fs::is_directory(path, error)) throw InputError(path + ": is a folder; expected a file");
   std::ifstream in(path, std::ios::binary);
   if (const int reason = errno; !in)
     throw InputError(reason == ENOENT ? path + ": no such file"
                                       : fmt::format("{}: cannot be read: {}; expected a file", path, std::strerror(reason)));
-  if (fs::is_regular_file(path, error) && fs::file_size(path, error) > kLargestText)
-    throw InputError(path + ": holds more than 1 GiB; expected a configuration or results");
-  std::string text = read_stream(in, path);
-  return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path) : text;
+  if (fs::is_regular_file(path, error)) expect_at_most(fs::file_size(path, error), most, path, "holds");
+  std::string text = read_stream(in, path, most);
+  return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path, most) : text;
 }
 
 void write_all(int file, std::string_view text, const std::string& path) {
@@ -138,7 +146,7 @@ void write_atomically(const std::string& path, const std::function<void(const Te
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file < 0) fail(path, "written");
   try {
-    constexpr std::size_t kMostWaiting = std::size_t{1} << 20;
+    constexpr std::size_t kMostWaiting = kMebi;
     std::string waiting;
     write([&](std::string_view part) {
       waiting += part;
@@ -168,6 +176,11 @@ void expect_replaceable(const std::string& path) {
     throw InputError(fmt::format("{}: cannot be written: {}; give another path", path, error.message()));
   if (fs::exists(status) && !fs::is_regular_file(status))
     throw InputError(path + ": is not a regular file; expected the path of a file, or - for standard output");
+}
+
+void expect_plain_or_none(const std::string& path) {
+  expect_replaceable(path);
+  if (fs::is_symlink(path)) throw InputError(path + ": is a link; give the path of the file");
 }
 
 void remove_leftovers(const std::string& path) {

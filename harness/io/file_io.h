@@ -7,11 +7,14 @@
 
 namespace nullmark {
 
-/// What is left of a stream; `path` names it.  Throws InputError beyond 1 GiB, and of a device beyond 16 MiB.
-std::string read_stream(std::istream& in, const std::string& path);
+/// The largest text that is read, packed or not, in MiB: of results, and of a configuration.
+inline constexpr std::size_t kLargestResults = 1024, kLargestConfig = 64;
 
-/// Reads the whole file, and unpacks gzip.  Throws InputError if it cannot be read, or holds or unpacks to more than 1 GiB.
-std::string read_file(const std::string& path);
+/// What is left of a stream; `path` names it.  Throws InputError beyond `most` MiB, and of a device beyond 16 MiB.
+std::string read_stream(std::istream& in, const std::string& path, std::size_t most = kLargestResults);
+
+/// Reads the whole file, and unpacks gzip.  Throws InputError if it cannot be read, or holds or unpacks to more than `most` MiB.
+std::string read_file(const std::string& path, std::size_t most = kLargestResults);
 
 /// Takes a text part by part.
 using TextSink = std::function<void(std::string_view)>;
@@ -24,6 +27,9 @@ void write_atomically(const std::string& path, const std::function<void(const Te
 
 /// Throws InputError if the path is a folder, a device or a pipe, which a file would replace.
 void expect_replaceable(const std::string& path);
+
+/// The same, and of links, for what other libraries write, who would write through them.
+void expect_plain_or_none(const std::string& path);
 
 /// Removes temporary files that processes left when they were killed in `write_atomically` of this path.
 void remove_leftovers(const std::string& path);

@@ -10,6 +10,8 @@
 #include <numeric>
 #include <set>
 
+#include "harness/io/text.h"
+
 template class nlohmann::basic_json<nlohmann::ordered_map>;
 
 namespace nullmark {
@@ -138,6 +140,8 @@ Json parse_json(const std::string& text, const std::string& file) {
     throw InputError(position(file, text, std::max<std::size_t>(offset(), 1) - 1) + ": " + bare_message(error.what()));
   }
 }
+
+InputError::InputError(const std::string& message) : std::runtime_error(one_line(message)) {}
 
 Json number_or_null(Real x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 Json number_or_null(const std::optional<Real>& x) { return x ? number_or_null(*x) : Json(nullptr); }

@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 
 /// Input from the user cannot be used: configuration, results file, journal, output path.  One line; exit code 2.
 struct InputError : std::runtime_error {
-  using std::runtime_error::runtime_error;
+  explicit InputError(const std::string& message);
 };
 
 /// Strict JSON.  Throws InputError "file:line:column: ..." for syntax errors and for keys that occur twice.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "harness/io/json_input.h"
 
@@ -27,10 +28,28 @@ bool same_file(const std::string& a, const std::string& b) {
   return fs::equivalent(a, b, error) || (!leads.empty() && leads == destination(b));
 }
 
+bool is_file(const std::string& path) { return !path.empty() && path != "-"; }
+
+/// What a file holds, if no page, table or report begins like it; else empty.
+std::string data_in(const std::string& path) {
+  constexpr std::size_t kBeginning = 4096;
+  std::string text(kBeginning, '\0');
+  std::ifstream in(path, std::ios::binary);
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  const bool object = first != std::string::npos && text[first] == '{';
+  for (const char* key : {"\"nullmark\":", "\"nullmark_journal\":", "\"nullmark_baseline\":"})
+    if (object && text.find(key) != std::string::npos) return "a configuration or results";
+  for (const auto& [magic, what] :
+       {std::pair{"\x1f\x8b", "packed data"}, {" BDV", "a volume"}, {"\x93NUMPY", "samples"}, {"\x76\x2f\x31\x01", "an image"}})
+    if (text.starts_with(magic)) return what;
+  return "";
+}
+
 }  // namespace
 
 void refuse_overwriting(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
-  const auto is_file = [](const std::string& path) { return !path.empty() && path != "-"; };
   std::vector<std::string> read;
   for (const std::string& input : inputs) {
     std::error_code error;
@@ -49,6 +68,20 @@ void refuse_overwriting(const std::vector<std::string>& inputs, const std::vecto
         throw InputError(
             fmt::format("{}: two outputs of the command would be written to this file; give each its own path", outputs[i]));
   }
+}
+
+void refuse_overwriting_data(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
+  refuse_overwriting(inputs, outputs);
+  for (const std::string& output : outputs) {
+    std::error_code error;
+    if (!is_file(output) || !fs::is_regular_file(output, error)) continue;
+    if (const std::string data = data_in(output); !data.empty())
+      throw InputError(fmt::format("{}: holds {}, which this output would replace; give the output another path", output, data));
+  }
+}
+
+void expect_new(const std::string& output, bool force) {
+  if (is_file(output) && !force && fs::exists(output)) throw InputError(output + ": exists; --force replaces it");
 }
 
 }  // namespace nullmark

@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <set>
 
 #include "harness/io/claims_json.h"
+#include "harness/io/consistency.h"
 #include "harness/io/spec_json.h"
 #include "harness/io/tables_json.h"
+#include "harness/io/text.h"
 
 namespace nullmark {
 
@@ -48,31 +49,6 @@ std::string statistics_text(const RunRecord& run) {
   return text;
 }
 
-namespace {
-
-/// Throws InputError where the numbers of a cell contradict each other, as in a file that was changed by hand.
-void expect_consistent(const CellRecord& record, const JsonNode& cell) {
-  constexpr const char* kChanged = "the file was changed, or is damaged: make the results again";
-  if (record.status != Status::ok) return;
-  // Of pictures a sample is the mean of a group of rays.
-  const std::uint64_t each = record.cell.samples_per_ray, drawn = each == 0 ? 0 : record.samples / each;
-  if (drawn < 1 || drawn > record.rays || record.samples % each != 0)
-    cell["samples"].fail(
-        fmt::format("found {} samples of {} rays with {} each; {}", record.samples, record.rays, each, kChanged));
-  // Of a difference that was computed before its terms were rounded to text.
-  constexpr Real kRounding = 1e-9;
-  for (const ChannelRecord& channel : record.channel) {
-    if (!channel.mean || !channel.reference || !channel.bias) continue;
-    if (std::abs(*channel.mean - *channel.reference - *channel.bias) <=
-        kRounding * (std::abs(*channel.mean) + std::abs(*channel.reference)))
-      continue;
-    cell["bias"].fail(fmt::format("found bias {:.6g}, and {:.6g} as the mean less the reference; {}", *channel.bias,
-                                  *channel.mean - *channel.reference, kChanged));
-  }
-}
-
-}  // namespace
-
 RunRecord read_results(const std::string& text, const std::string& file) {
   const auto no_results = [&] { return InputError(file + ": is not a results file of nullmark; `nullmark run` writes them"); };
   const std::size_t first = text.find_first_not_of(" \t\r\n");
@@ -87,15 +63,18 @@ RunRecord read_results(const std::string& text, const std::string& file) {
   if (json[kVersionKey] != RunRecord::kVersion)
     top[kVersionKey].expected(fmt::format("\"{}\", the version this program reads", RunRecord::kVersion));
   RunRecord run;
-  run.name = top["name"].string();
+  run.name = printable(top["name"].string());
   if (!top["config"].json().is_null()) run.config_text = top["config"].json().dump();
   top["provenance"].expect_object();
   for (const auto& [key, value] : top["provenance"].json().items()) run.provenance[key] = value.dump();
   std::set<std::pair<std::string, std::string>> seen;
   for (const JsonNode& cell : top["cells"].elements()) {
     run.cells.push_back(read_cell(cell));
-    const CellRecord& record = run.cells.back();
+    CellRecord& record = run.cells.back();
     expect_consistent(record, cell);
+    for (std::string* name : {&record.cell.name, &record.cell.experiment, &record.cell.estimator.label, &record.medium.label,
+                              &record.majorant.label, &record.ray_set.label})
+      *name = printable(*name);
     if (!seen.emplace(record.cell.id, record.cell.name).second)
       cell.fail(fmt::format("found \"{}\" a second time; expected each cell once", record.cell.name));
   }

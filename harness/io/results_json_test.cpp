@@ -87,6 +87,7 @@ TEST(ResultsJson, NothingButFiniteNumbersIsWritten) {
   RunRecord run = example_results();
   run.cells[0].channel[0].mean = std::numeric_limits<Real>::quiet_NaN();
   run.cells[0].channel[0].variance_theory = kInfinity;
+  run.cells[0].channel[0].relative_variance.reset();
   run.cells[0].time->floor_ratio = -kInfinity;
   run.cells[1].convergence[0].rmse[2] = kInfinity;
   const std::string text = results_text(run);
@@ -142,19 +143,39 @@ TEST(ResultsJson, ErrorsAreOneLine) {
 
 /// Numbers of a cell that contradict each other.
 TEST(ResultsJson, EditedFilesDoNotFitThemselves) {
-  const RunRecord run = example_results();
+  RunRecord run = example_results();
+  TestRecord test;
+  test.samples = 10;
+  test.basis = "betting";
+  VerdictRecord& verdict = run.cells[0].verdict.emplace();
+  verdict.against = "reference";
+  verdict.variance_basis = "analytic";
+  verdict.samples_per_ray = 10;
+  verdict.tests = {test};
   ASSERT_EQ(error_in(results_text(run)), "no error");
   const auto error_with = [&](const auto& edit) {
     RunRecord edited = run;
     edit(edited.cells[0]);
-    return error_in(results_text(edited));
+    const std::string error = error_in(results_text(edited));
+    return error.substr(0, error.find("; the file was changed"));
   };
-  EXPECT_NE(error_with([](CellRecord& cell) { *cell.channel[0].bias += 1e-3; }).find("r.json: /cells/0/bias: found bias "),
-            std::string::npos);
-  EXPECT_NE(error_with([](CellRecord& cell) { *cell.channel[0].mean += 1e-3; }).find("r.json: /cells/0/bias: found bias "),
-            std::string::npos);
-  EXPECT_NE(error_with([](CellRecord& cell) { cell.samples = 1'000'000'000'000'000; }).find("r.json: /cells/0/samples: found "),
-            std::string::npos);
+  EXPECT_EQ(error_with([](CellRecord& cell) { *cell.channel[0].bias += 1e-3; }).rfind("r.json: /cells/0/bias: found bias ", 0),
+            0u);
+  EXPECT_EQ(error_with([](CellRecord& cell) { *cell.channel[0].mean += 1e-3; }).rfind("r.json: /cells/0/bias: found bias ", 0),
+            0u);
+  const auto place_of = [&](const auto& edit) {
+    const std::string error = error_with(edit);
+    return error.substr(0, error.find(": found "));
+  };
+  EXPECT_EQ(place_of([](CellRecord& cell) { cell.samples = 1'000'000'000'000'000; }), "r.json: /cells/0/samples");
+  EXPECT_EQ(place_of([](CellRecord& cell) { cell.lookups *= 2; }), "r.json: /cells/0/lookups_per_sample");
+  EXPECT_EQ(place_of([](CellRecord& cell) { cell.draws /= 2; }), "r.json: /cells/0/rng_draws_per_sample");
+  EXPECT_EQ(place_of([](CellRecord& cell) { *cell.channel[0].rmse *= 0.9; }), "r.json: /cells/0/rmse");
+  EXPECT_EQ(place_of([](CellRecord& cell) { cell.channel[0].rmse = *cell.channel[0].bias / 2; }), "r.json: /cells/0/rmse");
+  EXPECT_EQ(place_of([](CellRecord& cell) { *cell.channel[0].variance *= 0.9; }), "r.json: /cells/0/variance");
+  EXPECT_EQ(place_of([](CellRecord& cell) { cell.channel[0].kurtosis = 0.5; }), "r.json: /cells/0/kurtosis");
+  EXPECT_EQ(place_of([](CellRecord& cell) { *cell.channel[0].relative_variance *= 0.9; }), "r.json: /cells/0/relative_variance");
+  EXPECT_EQ(place_of([](CellRecord& cell) { cell.verdict->samples_per_ray *= 2; }), "r.json: /cells/0/verdict");
   RunRecord twice = run;
   twice.cells.push_back(twice.cells[0]);
   EXPECT_NE(error_in(results_text(twice)).find("a second time; expected each cell once"), std::string::npos);

@@ -1,5 +1,6 @@
 #include "harness/io/tables_json.h"
 
+#include "harness/io/text.h"
 #include "harness/model/metrics.h"
 
 namespace nullmark {
@@ -29,7 +30,7 @@ TableRow read_row(const JsonNode& node, const CellReader& finder) {
     node["tolerance"].fail("is not tested in a table; use a claim with \"required\": true, \"near\" and \"tolerance\"");
   node.expect_keys({"label", "given", "cells", "theory", "note", "relative_to"});
   TableRow row;
-  row.label = node["label"].string();
+  row.label = printable(node["label"].string());
   if (node.has("note")) row.note = node["note"].string();
   if (node.has("given")) {
     node["given"].expect_object();
@@ -53,7 +54,7 @@ std::vector<Table> read_tables(const JsonNode& node, const CellReader& finder) {
   for (const JsonNode& entry : node.elements()) {
     entry.expect_keys({"title", "metric", "rows"});
     Table table;
-    table.title = entry["title"].string();
+    table.title = printable(entry["title"].string());
     if (entry.has("metric")) table.metric = entry["metric"].one_of(metric_names(), "metric");
     for (const JsonNode& row : entry["rows"].elements()) table.rows.push_back(read_row(row, finder));
     tables.push_back(std::move(table));

@@ -58,22 +58,61 @@ std::string markdown_code(const std::string& text) {
   return fence + space + within_cell(text) + space + fence;
 }
 
-std::string plain_text(std::string_view text) {
-  const auto byte_at = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0; };
-  // The second block of control characters is two bytes each in UTF-8.
-  const auto second_block = [&](std::size_t i) { return byte_at(i) == 0xc2 && byte_at(i + 1) >= 0x80 && byte_at(i + 1) <= 0x9f; };
+namespace {
+
+/// Characters that a terminal shows nothing of, though it obeys them: U+200E, U+202E and their kin, and the breaks of lines and
+/// paragraphs.
+bool directs(unsigned character) {
+  return character == 0x061c || character == 0x200e || character == 0x200f || (character >= 0x2028 && character <= 0x202e) ||
+         (character >= 0x2066 && character <= 0x2069);
+}
+
+bool continues_character(char byte) { return (static_cast<unsigned char>(byte) & 0xc0) == 0x80; }
+
+std::string without_controls(std::string_view text, std::string_view kept) {
+  const auto byte_at = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
   std::string result;
   result.reserve(text.size());
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto byte = byte_at(i);
-    if ((byte < 0x20 && byte != '\n' && byte != '\t') || byte == 0x7f)
+    const unsigned byte = byte_at(i);
+    // Of UTF-8 with two bytes and with three.
+    const unsigned of_two = (byte & 0x1f) << 6 | (byte_at(i + 1) & 0x3f),
+                   of_three = (byte & 0x0f) << 12 | (byte_at(i + 1) & 0x3f) << 6 | (byte_at(i + 2) & 0x3f);
+    if ((byte < 0x20 && kept.find(text[i]) == std::string_view::npos) || byte == 0x7f) {
       result += fmt::format("\\x{:02x}", byte);
-    else if (second_block(i))
-      result += fmt::format("\\x{:02x}", byte_at(++i));
-    else
+    } else if (byte == 0xc2 && of_two >= 0x80 && of_two <= 0x9f) {
+      result += fmt::format("\\x{:02x}", of_two);
+      i += 1;
+    } else if (byte == 0xd8 && directs(of_two)) {
+      result += fmt::format("\\u{:04x}", of_two);
+      i += 1;
+    } else if (byte == 0xe2 && directs(of_three)) {
+      result += fmt::format("\\u{:04x}", of_three);
+      i += 2;
+    } else {
       result += text[i];
+    }
   }
   return result;
+}
+
+}  // namespace
+
+std::string plain_text(std::string_view text) { return without_controls(text, "\n\t"); }
+
+std::string printable(std::string_view text) { return without_controls(text, ""); }
+
+std::string one_line(std::string_view text) {
+  constexpr std::size_t kLongest = 2000, kEnd = 600;
+  constexpr std::string_view kLeftOut = " ... ";
+  std::string line = plain_text(text);
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  if (line.size() <= kLongest) return line;
+  // No character is cut.
+  std::size_t begin = kLongest - kEnd - kLeftOut.size(), end = line.size() - kEnd;
+  while (continues_character(line[begin])) --begin;
+  while (end < line.size() && continues_character(line[end])) ++end;
+  return line.substr(0, begin).append(kLeftOut).append(line, end);
 }
 
 std::string markdown_table(const std::vector<std::vector<std::string>>& lines) {

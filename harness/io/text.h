@@ -22,8 +22,15 @@ std::string markdown_cell(const std::string& text);
 /// The same as code that can be copied.
 std::string markdown_code(const std::string& text);
 
-/// Text for people: control characters other than line breaks and tabs, which a terminal would obey, are shown as \x1b.
+/// Text for people: control characters other than line breaks and tabs, which a terminal would obey, are shown as \x1b, and those
+/// that change the direction of the text as \u202e.
 std::string plain_text(std::string_view text);
+
+/// A name: plain text whose line breaks and tabs are shown as \x0a as well.
+std::string printable(std::string_view text);
+
+/// A message: one line of plain text.  Of more than 2000 bytes, as where it quotes a long name, the middle is left out.
+std::string one_line(std::string_view text);
 
 /// Four significant digits, or "-" if there is no number.
 std::string short_number(const std::optional<Real>& number);

@@ -12,6 +12,35 @@ TEST(Text, TerminalsObeyNothingOfIt) {
   EXPECT_EQ(plain_text("\xc2\x9b 31m \xc3\xa9 \xc5\x82"), "\\x9b 31m \xc3\xa9 \xc5\x82");
 }
 
+/// Where a character of the text turns the rest of the line around, people read what is not there.
+TEST(Text, DirectionsAreShown) {
+  EXPECT_EQ(plain_text("a\xe2\x80\xae"
+                       "b\xe2\x81\xa6\xe2\x80\xa8\xd8\x9c"),
+            "a\\u202eb\\u2066\\u2028\\u061c");
+  // An ellipsis, a euro sign and a letter share their first byte with them.
+  EXPECT_EQ(plain_text("\xe2\x80\xa6 \xe2\x82\xac \xd8\xa7"), "\xe2\x80\xa6 \xe2\x82\xac \xd8\xa7");
+  EXPECT_EQ(plain_text("cut \xe2\x80"), "cut \xe2\x80");
+}
+
+TEST(Text, NamesAreOneWord) { EXPECT_EQ(printable("a\tb\nc\x1b"), "a\\x09b\\x0ac\\x1b"); }
+
+TEST(Text, MessagesAreOneLineOfBoundedLength) {
+  EXPECT_EQ(one_line("a\nb\x1b"), "a b\\x1b");
+  const std::string at_most(2000, 'x');
+  EXPECT_EQ(one_line(at_most), at_most);
+  std::string longer = "begin";
+  for (int n = 0; n < 1'000'000; ++n) longer += "\xc3\xa9";
+  const std::string cut = one_line(longer + "; give another");
+  EXPECT_LE(cut.size(), 2000u);
+  EXPECT_TRUE(cut.starts_with("begin\xc3\xa9")) << cut;
+  EXPECT_TRUE(cut.ends_with("\xc3\xa9; give another")) << cut;
+  // Letters of two bytes, none of them cut.
+  const std::size_t middle = cut.find(" ... ");
+  ASSERT_NE(middle, std::string::npos);
+  EXPECT_EQ(cut[middle - 1], '\xa9');
+  EXPECT_EQ(cut[middle + 5], '\xc3');
+}
+
 TEST(Text, MarkdownKeepsItsTablesAndBeginsNoHtml) {
   EXPECT_EQ(markdown_cell("a|b\nc"), "a\\|b c");
   EXPECT_EQ(markdown_cell("<script>x</script><!-- <?x"), "&lt;script>x&lt;/script>&lt;!-- &lt;?x");

@@ -67,8 +67,7 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
     std::filesystem::create_directories(options.image_directory);
     const auto path_of = [&](const std::string& file) {
       const std::filesystem::path path = std::filesystem::path(options.image_directory) / file;
-      if (std::filesystem::is_symlink(path)) throw InputError(path.string() + ": is a link, and is not replaced by a picture");
-      expect_replaceable(path.string());
+      expect_plain_or_none(path.string());
       return path.string();
     };
     const auto write = [&](const char* kind, const std::vector<Real>& values, std::size_t count, Real maximum) {

@@ -55,6 +55,8 @@ void Journal::lock() {
   for (;;) {
     // Neither through a link, whose target would be emptied, nor into a pipe that nobody reads.
     file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_APPEND | O_NOFOLLOW | O_NONBLOCK, 0666);
+    if (file_ < 0 && errno == ELOOP)
+      throw InputError(path_ + ": is a link, and a journal is a file; remove it or give another -o");
     if (file_ < 0)
       throw InputError(
           fmt::format("{}: cannot be written: {}; give -o a path in an existing, writable folder", path_, std::strerror(errno)));
@@ -96,7 +98,12 @@ void Journal::read(const std::string& config_hash, Mode mode) {
       read_line(line, where, config_hash);
       continue;
     }
-    const Json head = parse_json(line, where);
+    Json head;
+    try {
+      head = parse_json(line, where);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}; the journal is damaged: --force starts again", error.what()));
+    }
     read_head(JsonNode(head, where), config_hash);
   }
   holds_cells_ = !cells_.empty();

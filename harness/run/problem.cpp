@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <set>
 
 #include "harness/config/config.h"
@@ -30,6 +32,11 @@ constexpr const char *kFile = "problem.json", *kVolumeType = "vdb";
 /// Of other quantities a sample is no single number of a ray.
 bool is_written(Quantity quantity) { return quantity == Quantity::transmittance || quantity == Quantity::optical_depth; }
 
+/// With the pointer of the component that it complains of.
+std::string told(const std::string& pointer, const ParameterError& error) {
+  return fmt::format("{}{}{}: {}", pointer, error.parameter.empty() ? "" : "/", error.parameter, error.what());
+}
+
 /// Media of a problem name files in its folder.
 void locate_media(Plan& plan, const std::string& folder) {
   for (MediumSpec& medium : plan.media) {
@@ -46,10 +53,28 @@ std::string text_of(const MediumSpec& medium, const char* key, const std::string
   return text ? *text : otherwise;
 }
 
+/// A folder of nothing but what this program writes: it does not stay behind where that fails.
+class FreshFolder {
+ public:
+  explicit FreshFolder(const std::string& folder)
+      : folder_(folder), exists_(fs::exists(folder)), empty_(!exists_ || fs::is_empty(folder)) {}
+  FreshFolder(const FreshFolder&) = delete;
+  FreshFolder& operator=(const FreshFolder&) = delete;
+  ~FreshFolder() {
+    std::error_code error;
+    if (kept_ || !empty_) return;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) fs::remove_all(entry.path(), error);
+    if (!exists_) fs::remove(folder_, error);
+  }
+  void keep() { kept_ = true; }
+
+ private:
+  std::string folder_;
+  bool exists_, empty_, kept_ = false;
+};
+
 void prepare_folder(const std::string& folder, bool force) {
   std::error_code error;
-  if (fs::exists(folder, error) && !fs::is_directory(folder, error))
-    throw InputError(folder + ": is no folder; expected a new one");
   if (!force && fs::exists(folder, error) && !fs::is_empty(folder, error))
     throw InputError(folder + ": is not empty; --force writes into it");
   for (const char* part : {"volumes", "rays"}) {
@@ -72,6 +97,10 @@ class ProblemWriter {
 
   std::vector<std::string> write() {
     choose();
+    std::error_code error;
+    if (fs::exists(options_.folder, error) && !fs::is_directory(options_.folder, error))
+      throw InputError(options_.folder + ": is no folder; expected a new one");
+    FreshFolder fresh(options_.folder);
     prepare_folder(options_.folder, options_.force);
     for (std::size_t i = 0; i < problem_.cells.size(); ++i) write_medium(i);
     const std::string config = applied_config(problem_);
@@ -86,6 +115,7 @@ class ProblemWriter {
                           {"config", parse_json(config, kFile)}};
     write_atomically(path("README.md"), problem_readme(plan_.name, options_.answers));
     write_atomically(path(kFile), problem.dump(1) + "\n");
+    fresh.keep();
     return std::move(left_out_);
   }
 
@@ -115,6 +145,10 @@ class ProblemWriter {
       if (medium.field.type == "channels")
         throw InputError(fmt::format("{}: found a medium of {} fields; expected a grey one, or one field with a \"spectrum\"",
                                      medium.field.pointer, medium.per_channel.size()));
+      if (const std::string missing = why_missing(cell); !missing.empty()) {
+        other.insert(missing);
+        continue;
+      }
       Cell scene;
       scene.experiment = std::to_string(problem_.cells.size());
       scene.estimator.type = "ratio";
@@ -132,6 +166,26 @@ class ProblemWriter {
     left_out_.assign(other.begin(), other.end());
     if (problem_.cells.empty())
       throw InputError(fmt::format("{}: no cell has the quantity transmittance or optical_depth; nothing to write", plan_.name));
+  }
+
+  /// Why the medium of a cell cannot be had, if it need not be.  Throws InputError, in the words of the configuration, where it
+  /// or the rays cannot be built.
+  std::string why_missing(const Cell& cell) {
+    const MediumSpec& spec = plan_.media[cell.medium];
+    std::string where = spec.field.pointer;
+    try {
+      std::optional<BuiltMedium>& built = built_[cell.medium];
+      if (!built) built = build_medium(spec);
+      const Component& rays = plan_.ray_sets[cell.rays];
+      where = rays.pointer;
+      build_rays(rays, *built);
+      return "";
+    } catch (const MissingData& error) {
+      if (spec.optional) return error.what();
+      throw InputError(fmt::format("{}/file: {}; say \"optional\": true to leave it out", spec.field.pointer, error.what()));
+    } catch (const ParameterError& error) {
+      throw InputError(told(where, error));
+    }
   }
 
   /// The medium of a scene, as a volume.
@@ -174,7 +228,7 @@ class ProblemWriter {
       volume.values["file"] = file;
       return volume;
     } catch (const ParameterError& error) {
-      throw InputError(fmt::format("{}{}{}: {}", name, error.parameter.empty() ? "" : "/", error.parameter, error.what()));
+      throw InputError(told(name, error));
     }
   }
 
@@ -241,8 +295,9 @@ class ProblemWriter {
 
   const Plan& plan_;
   const ProblemOptions& options_;
-  Plan problem_;                        ///< what `judge` reads: scene i has medium i
-  std::vector<std::size_t> originals_;  ///< its medium in the plan
+  Plan problem_;                                             ///< what `judge` reads: scene i has medium i
+  std::vector<std::size_t> originals_;                       ///< its medium in the plan
+  std::map<std::size_t, std::optional<BuiltMedium>> built_;  ///< media of the plan
   std::vector<std::string> left_out_;
 };
 

@@ -237,7 +237,8 @@ class TestPlanner {
       // Trackers that divide by the chance of a rare event enlarge rounding; a billionth of epsilon is no bias.
       test.rounding = std::max(test.rounding, kNoBias * test.epsilon);
       // Rare events that a pilot did not see are no proof of a zero variance.
-      test.deterministic = exact_ || (analytic_ && !(test.variance > kSurely * test.rounding * test.rounding));
+      test.deterministic =
+          exact_ || (analytic_ && !may_be_killed(pool) && !(test.variance > kSurely * test.rounding * test.rounding));
       if (!analytic_ && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
       // Far below epsilon a variance decides nothing, and theory's may be rounding.
       if (!test.deterministic) test.variance = std::max(test.variance, test.epsilon * test.epsilon / 4);
@@ -245,6 +246,12 @@ class TestPlanner {
       demand(test, pool);
       plan_.tests.push_back(std::move(test));
     }
+  }
+
+  /// A random number of 24 bits is 0 once in 2^24 lookups, and then collides with any extinction: samples in float that are 1 may
+  /// be 0 at times, however unlikely a collision is.
+  bool may_be_killed(const Pool& pool) const {
+    return cell_.precision == Precision::float32 && plan_.high == 1 && pool.most > 0.5;
   }
 
   void place(MeanTest& test, const ErrorLaw& law) {

@@ -43,6 +43,8 @@ struct AlongAxis {
 
   int axis = 0;
   Real scale = 1, inverse_extent = 1;
+  bool fits_single = true;  ///< scale and profile, each for itself, are numbers of float
+  static constexpr Real kLeastSingle = 1e-30;
 
   void parameters(ParameterVisitor& visit) {
     profile.parameters(visit);
@@ -60,11 +62,15 @@ struct AlongAxis {
     if constexpr (requires { profile.prepare(); }) profile.prepare();
     if (target_depth > 0) {
       const Real whole = profile.integral(0, 1) * (hi[axis] - lo[axis]);
-      if (!(whole > 0) || !std::isfinite(whole))
+      // Below it the profile's own values have lost digits.
+      constexpr Real kLeast = 1e-280;
+      if (!(whole > kLeast) || !std::isfinite(whole))
         throw ParameterError("optical_depth",
-                             "cannot rescale a profile whose integral is zero or infinite; give optical_depth 0");
+                             "cannot rescale a profile whose integral is below 1e-280 or infinite; give optical_depth 0");
       scale = target_depth / whole;
     }
+    const auto fits = [](Real x) { return x == 0 || (x > kLeastSingle && x < 1 / kLeastSingle); };
+    fits_single = fits(scale) && fits(profile.extrema(0, 1).second);
   }
 
   Box bounds() const { return {lo, hi}; }
@@ -80,15 +86,20 @@ struct AlongAxis {
   template <class T>
   void extinction(const BasicPoints<T>& points, T* out) const {
     const T* x = axis == 0 ? points.x : axis == 1 ? points.y : points.z;
+    const auto in_double = [&] {
+      for (std::size_t i = 0; i < points.size; ++i) out[i] = static_cast<T>(scale * profile.value(coordinate(Real{x[i]})));
+    };
     if constexpr (requires(Lanes<T, 1> s) { profile.value(s); }) {
+      if (std::is_same_v<T, float> && !fits_single) return in_double();
       const auto value = [this](auto lanes) { return scale * profile.value(coordinate(lanes)); };
       // Paths look up one point after the other.
       if (points.size == 1)
         value(Lanes<T, 1>::load(x)).store(out);
       else
         map_lanes(x, points.size, out, value);
-    } else
-      for (std::size_t i = 0; i < points.size; ++i) out[i] = static_cast<T>(scale * profile.value(coordinate(Real{x[i]})));
+    } else {
+      in_double();
+    }
   }
 
   Extrema extrema(const Box& box) const {

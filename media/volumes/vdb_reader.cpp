@@ -202,7 +202,8 @@ VolumeData read_vdb(const std::string& file, const std::string& grid) {
   if (!std::filesystem::exists(found)) throw MissingData(fmt::format("{}: no such file (grid \"{}\")", file, grid));
   // A pipe or a device would keep its reader waiting.
   if (!std::filesystem::is_regular_file(found)) refuse("not a regular file; expected the path of an OpenVDB file");
-  if (::access(file.c_str(), R_OK) != 0) refuse(fmt::format("cannot be read: {}", std::strerror(errno)));
+  if (::access(file.c_str(), R_OK) != 0)
+    refuse(fmt::format("cannot be read: {}; expected a file that you may read", std::strerror(errno)));
   const std::uint64_t size = std::filesystem::file_size(file, error);
   if (error) refuse(error.message());
 

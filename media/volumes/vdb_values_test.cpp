@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "media/media_test.h"
 #include "media/volumes/vdb_test.h"
 #include "media/volumes/vdb_writer.h"
 #include "media/volumes/volume.h"
@@ -298,6 +299,30 @@ TEST_F(Vdb, ProceduralVolumeReadsBack) {
   options.resolution = 1 << 20;
   EXPECT_THROW(write_procedural_vdb(path(), options), ParameterError);
   EXPECT_THROW(write_procedural_vdb(path("absent/grid.vdb")), ParameterError);
+}
+
+TEST_F(Vdb, OpticalDepthIsOfTheDiagonal) {
+  auto grid = cloud(Coord(-3, 0, 5), Coord(6, 8, 9));
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.25));
+  const media_test::Settings file = {{"file", written(grid)}};
+  const auto with = [&](const media_test::Settings& more) {
+    media_test::Settings all = file;
+    all.insert(more.begin(), more.end());
+    return media_test::make("vdb", all);
+  };
+  for (const char* filter : {"trilinear", "nearest"}) {
+    const media_test::Settings interpolation = {{"interpolation", std::string(filter)}};
+    media_test::Settings deep = interpolation;
+    deep["optical_depth"] = Real{5};
+    const auto plain = with(interpolation), scaled = with(deep);
+    const Box box = scaled->bounds();
+    const Real diagonal = 0.25 * box.extent().norm();
+    EXPECT_NEAR(scaled->extrema(box).average[0] * diagonal, 5, 1e-12) << filter;
+    // The same field but for its scale.
+    const Vec3 p(1, 2, 7);
+    EXPECT_NEAR(at(*scaled, p) / at(*plain, p), 5 / (plain->extrema(box).average[0] * diagonal), 1e-12) << filter;
+  }
+  EXPECT_THROW(with({{"optical_depth", Real{5}}, {"extinction_per_value", Real{2}}}), ParameterError);
 }
 
 TEST_F(Vdb, RealVolumesMatchOpenVdb) {

@@ -142,19 +142,35 @@ class VdbSource final : public MediumSource {
     visit.text("grid", grid_, "name of the grid, name[n] (from 0, in file order) where names repeat");
     visit.number("extinction_per_value", extinction_per_value_, Range::non_negative(), "1/length",
                  "extinction of a voxel value of 1");
+    visit.number("optical_depth", optical_depth_, Range::non_negative(), "",
+                 "average extinction times the diagonal of the bounds, in place of extinction_per_value; 0: not used");
     visit.choice("interpolation", interpolation_, {"trilinear", "nearest"}, "field between voxel centres");
   }
 
   std::shared_ptr<const Medium> build() const override {
+    if (optical_depth_ > 0 && extinction_per_value_ != 1)
+      throw ParameterError("optical_depth", "scales the volume as \"extinction_per_value\" does; expected one of them");
     auto data = std::make_shared<const VolumeData>(read_vdb(file_, grid_));
-    if (interpolation_ == "nearest")
-      return std::make_shared<FilteredVolume<NearestFilter>>(std::move(data), extinction_per_value_);
-    return std::make_shared<FilteredVolume<TrilinearFilter>>(std::move(data), extinction_per_value_);
+    if (interpolation_ == "nearest") return scaled<NearestFilter>(std::move(data));
+    return scaled<TrilinearFilter>(std::move(data));
   }
 
  private:
+  template <class Filter>
+  std::shared_ptr<const Medium> scaled(std::shared_ptr<const VolumeData> data) const {
+    Real scale = extinction_per_value_;
+    if (optical_depth_ > 0) {
+      const FilteredVolume<Filter> unit(data, 1);
+      const Box bounds = unit.bounds();
+      const Real depth = unit.extrema(bounds).average[0] * (data->index_to_world.linear() * bounds.extent()).norm();
+      if (!(depth > 0)) throw ParameterError("optical_depth", "a volume without extinction has none; expected 0");
+      scale = optical_depth_ / depth;
+    }
+    return std::make_shared<FilteredVolume<Filter>>(std::move(data), scale);
+  }
+
   std::string file_, grid_ = "density", interpolation_ = "trilinear";
-  Real extinction_per_value_ = 1;
+  Real extinction_per_value_ = 1, optical_depth_ = 0;
 };
 
 }  // namespace nullmark

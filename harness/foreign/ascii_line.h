@@ -7,7 +7,7 @@
 namespace nullmark {
 
 /// Text from outside as one line for messages and records: printable ASCII, others as "?", at most 300 characters.
-inline std::string printable(std::string_view text) {
+inline std::string ascii_line(std::string_view text) {
   constexpr std::size_t kMost = 300;
   std::string line(text.substr(0, kMost));
   std::replace_if(

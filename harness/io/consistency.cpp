@@ -1,0 +1,96 @@
+#include "harness/io/consistency.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "harness/model/metrics.h"
+
+namespace nullmark {
+namespace {
+
+/// The figures of a cell, compared with what its other figures say.
+class Comparison {
+ public:
+  Comparison(const CellRecord& record, const JsonNode& cell) : record_(record), cell_(cell) {}
+
+  void expect_counts() const {
+    const std::uint64_t each = record_.cell.samples_per_ray;
+    // Of pictures a sample is the mean of a group of rays.
+    const std::uint64_t drawn = each == 0 ? 0 : record_.samples / each;
+    if (drawn < 1 || drawn > record_.rays || record_.samples % each != 0)
+      fail("samples", fmt::format("{} samples of {} rays with {} each", record_.samples, record_.rays, each));
+    const auto samples = static_cast<Real>(record_.samples);
+    expect("lookups_per_sample", record_.lookups_per_sample, static_cast<Real>(record_.lookups) / samples, "lookups / samples");
+    expect("rng_draws_per_sample", record_.draws_per_sample, static_cast<Real>(record_.draws) / samples, "rng_draws / samples");
+    if (record_.verdict) expect_counts(*record_.verdict, drawn);
+  }
+
+  void expect_channel(std::size_t c) const {
+    const ChannelRecord& channel = record_.channel[c];
+    if (channel.mean && channel.reference && channel.bias)
+      expect("bias", channel.bias, *channel.mean - *channel.reference, "the mean less the reference",
+             std::abs(*channel.mean) + std::abs(*channel.reference));
+    if (channel.rmse && channel.bias && *channel.rmse < std::abs(*channel.bias) * (1 - kRounding))
+      fail("rmse", fmt::format("rmse {:.6g}, below the bias {:.6g}", *channel.rmse, *channel.bias));
+    const Real most = static_cast<Real>(record_.samples) * (1 + kRounding);
+    if (channel.kurtosis && !(*channel.kurtosis >= 1 - kRounding && *channel.kurtosis <= most))
+      fail("kurtosis", fmt::format("kurtosis {:.6g}, which no {} samples have", *channel.kurtosis, record_.samples));
+    if (const auto& best = best_variance(channel); best && channel.reference_rms && *channel.reference_rms > 0)
+      expect("relative_variance", channel.relative_variance, *best / *channel.reference_rms / *channel.reference_rms,
+             "variance / reference.rms^2");
+    if (!record_.convergence.empty()) expect_convergence(c);
+  }
+
+ private:
+  /// Figures that determine each other were summed in another order.
+  static constexpr Real kRounding = 1e-6;
+
+  [[noreturn]] void fail(const char* key, const std::string& found) const {
+    cell_[key].fail(fmt::format("found {}; the file was changed, or is damaged: make the results again", found));
+  }
+
+  void expect(const char* key, const std::optional<Real>& figure, Real wanted, const char* meaning, Real scale = 0) const {
+    if (!figure || !std::isfinite(wanted)) return;
+    if (std::abs(*figure - wanted) <= kRounding * (scale > 0 ? scale : std::abs(wanted))) return;
+    fail(key, fmt::format("{} {:.9g}, and {:.9g} as {}", key, *figure, wanted, meaning));
+  }
+
+  void expect_counts(const VerdictRecord& verdict, std::uint64_t drawn) const {
+    for (const TestRecord& test : verdict.tests)
+      if (test.group < 0 && test.samples != verdict.samples_per_ray * drawn)
+        fail("verdict",
+             fmt::format("a test of {} samples, and {} in each of {} rays", test.samples, verdict.samples_per_ray, drawn));
+  }
+
+  /// The errors of single samples, and of means of all samples.
+  void expect_convergence(std::size_t c) const {
+    const ChannelRecord& channel = record_.channel[c];
+    const auto figure = [&](const std::vector<std::optional<Real>>& values) {
+      return c < values.size() ? values[c] : std::nullopt;
+    };
+    const std::uint64_t each = record_.cell.samples_per_ray;
+    const std::optional<Real> single = figure(record_.convergence.front().rmse), all = figure(record_.convergence.back().rmse);
+    if (record_.convergence.back().samples == each && all)
+      expect("rmse", channel.rmse, *all, "the last of convergence", std::abs(*all));
+    if (!single || !channel.rmse || record_.convergence.front().samples != 1) return;
+    const auto n = static_cast<Real>(each);
+    // The mean square of single errors is the samples' variance about the ray's mean, and the square of that mean's error.
+    const Real within = *single * *single - *channel.rmse * *channel.rmse;
+    if (each > 1) expect("variance", channel.variance, within * n / (n - 1), "convergence and rmse tell", *single * *single);
+  }
+
+  const CellRecord& record_;
+  const JsonNode& cell_;
+};
+
+}  // namespace
+
+void expect_consistent(const CellRecord& record, const JsonNode& cell) {
+  if (record.status != Status::ok) return;
+  const Comparison comparison(record, cell);
+  comparison.expect_counts();
+  for (std::size_t c = 0; c < record.channel.size(); ++c) comparison.expect_channel(c);
+}
+
+}  // namespace nullmark
