@@ -8,6 +8,15 @@
 
 namespace nullmark {
 
+/// What decomposition trackers ask of `control_albedo`, the share of the control that scatters.  Its collisions look nothing up,
+/// so they cannot tell an albedo that varies.
+inline void expect_control_albedo(const MatterBounds& medium, const std::vector<Real>& control_albedo) {
+  if (medium.albedo_varies && control_albedo.empty())
+    throw ParameterError("control_albedo",
+                         "the medium's albedo varies, and the control looks nothing up; expected the share of "
+                         "the control that scatters");
+}
+
 /// The control extinction mu_c(t) of residual tracking along a ray, with tau_c in closed form and the rate that goes with it.
 ///
 ///   minimum, average, middle, maximum   of the segment's bounds (one segment: of the medium; a grid: of each super-voxel)

@@ -9,13 +9,14 @@
 #include "estimators/walk/event.h"
 #include "estimators/walk/medium_ray.h"
 #include "estimators/walk/quantity.h"
+#include "media/base/matter_bounds.h"
 #include "media/base/parameters.h"
 
 namespace nullmark {
 
-// An estimator is a class template over Value (media/base/value.h): Real on grey media, a SpectrumOf some width on chromatic ones,
-// Lanes where walks run side by side.  Its parameters are fields.  RayData is the estimator's own type of that name,
-// or MediumRay<Value>.  harness/kernel/estimator_traits.h rejects members of these names with other signatures.  Required:
+// An estimator is a class template over Value (media/base/value.h): Real on grey media, a SpectrumOf some width on chromatic
+// ones, Lanes where walks run side by side.  Its parameters are fields.  RayData is the estimator's own type of that name, or
+// MediumRay<Value>.  harness/kernel/estimator_traits.h rejects members of these names with other signatures.  Required:
 //
 //   static constexpr kName, kSummary, kSource
 //       the name in configurations, a one-line summary, paper and equation
@@ -35,7 +36,7 @@ namespace nullmark {
 // Optional:
 //
 //   void parameters(ParameterVisitor&)
-//   void check(const Extrema& medium) const
+//   void check(const MatterBounds& medium) const
 //       throws ParameterError: parameters do not fit the medium
 //   SampleRange range() const
 //       if the range depends on the parameters

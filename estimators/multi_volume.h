@@ -21,7 +21,7 @@ struct MultiVolumeTracking : DeltaTracking<Value> {
 
   void parameters(ParameterVisitor&) {}
 
-  void check(const Extrema& medium) const {
+  void check(const MatterBounds& medium) const {
     if (medium.minimum.size() > 1)
       throw ParameterError("type", std::string(kName) + " takes grey media only; expected one channel, found " +
                                        std::to_string(medium.minimum.size()) + "; \"spectral\" takes chromatic media");

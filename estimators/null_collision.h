@@ -39,7 +39,7 @@ struct NullCollisionTracking {
     visit.number("null", null, kChance, "", "chance of a null collision (fixed)");
   }
 
-  void check(const Extrema&) const {
+  void check(const MatterBounds&) const {
     if (probabilities != "fixed") return;
     constexpr Real kRounding = 1e-12;
     if (roulette == "one" && std::abs(absorb + scatter + null - 1) > kRounding)
@@ -75,7 +75,7 @@ struct NullCollisionTracking {
   }
 
   void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Coefficients<Value> mu(extinction, ray.albedo, at.rate());
+    const Coefficients<Value> mu(extinction, ray.albedo_at(at.position()), at.rate());
     const Chances chance = chances(ray, mu);
     const std::optional<EventKind> kind =
         ray.three ? three_roulettes(chance, rng) : choose_event(rng.uniform(), chance.absorb, chance.scatter, chance.null);
@@ -98,7 +98,7 @@ struct NullCollisionTracking {
       rate.push_back(mub);
       Value extinction = ray.value(0);
       for (int l = 0; l < ray.channels; ++l) channel(extinction, l) = profile.nodes(l)[j].extinction;
-      const Coefficients<Value> mu(extinction, ray.albedo, mub);
+      const Coefficients<Value> mu(extinction, ray.albedo_at(profile.nodes(c)[j].t), mub);
       const Real p = mub > 0 ? chances(ray, mu).null : 0, mu_n = channel(mu.null, c);
       through.push_back(mub * p);
       death.push_back(mub - through.back());
@@ -115,7 +115,7 @@ struct NullCollisionTracking {
       const Real mub = ray.majorant.rate(profile.nodes(c)[j].piece);
       Value extinction = ray.value(0);
       for (int l = 0; l < ray.channels; ++l) channel(extinction, l) = profile.nodes(l)[j].extinction;
-      const Coefficients<Value> mu(extinction, ray.albedo, mub);
+      const Coefficients<Value> mu(extinction, ray.albedo_at(profile.nodes(c)[j].t), mub);
       const Chances chance = mub > 0 ? chances(ray, mu) : Chances{0, 0, 0};
       const auto second = [&](EventKind kind) {
         const Real own = channel(mu.of(kind), c), p = chance.of(kind);

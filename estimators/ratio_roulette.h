@@ -23,7 +23,7 @@ struct RatioRoulette {
     visit.number("survival", survival, {0, 1, true}, "", "probability of survival; at least the threshold");
   }
 
-  void check(const Extrema&) const {
+  void check(const MatterBounds&) const {
     if (survival < threshold) throw ParameterError("survival", "survival is below the threshold; weights would exceed 1");
   }
 

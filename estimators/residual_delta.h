@@ -24,7 +24,7 @@ struct ResidualDeltaTracking {
                  "control extinction (given); at most the medium's minimum");
   }
 
-  void check(const Extrema& medium) const {
+  void check(const MatterBounds& medium) const {
     if (choice.kind == "given" && choice.value > medium.minimum.minCoeff())
       throw ParameterError("value", "control exceeds the medium's least extinction; residual delta tracking needs mu_c <= mu");
   }

@@ -32,7 +32,7 @@ struct ResidualRatioTracking {
 
   bool needs_optical_depth() const { return choice.kind == "ray_average"; }
 
-  void check(const Extrema&) const {
+  void check(const MatterBounds&) const {
     if (choice.kind == "exponential" && !(choice.value > 0 && choice.value_end > 0))
       throw ParameterError("value", "an exponential control needs value and value_end above zero");
   }

@@ -37,6 +37,7 @@ void expect_finite(const std::shared_ptr<const Medium>& medium, Real looseness, 
     for (const bool draws : {true, false}) {
       HandWalked<E, Value> walked(with<E, Value>(set), medium, 1, looseness, 2);
       walked.ray.albedo = walked.ray.value(albedo);
+      walked.prepare();
       walked.ray.draws_absorption = draws;
       for (int pattern = 0; pattern < 8; ++pattern) {
         // u = 0 does not leave its place, so a walk whose flights all are 0 long would not end.

@@ -49,6 +49,7 @@ void expect_grey_law(auto set, std::initializer_list<Real> looseness = {1, 3}, i
         SCOPED_TRACE(std::string(E<Real>::kName) + " on medium " + std::to_string(which++));
         HandWalked<E> walked(with<E>(set), medium, 1, loose, pieces);
         walked.ray.albedo = 0.3;
+        walked.prepare();
         expect_law(walked, 60000);
         expect_theory(walked, 60000);
       }

@@ -19,11 +19,13 @@ namespace nullmark {
 ///   history_aware_average  R_k = avg_l |w_l mu_k,l|: avg_l w_l = 1 always, so that w_l <= the number of channels, where mub
 ///   bounds
 ///
-/// w_l includes what the path's earlier flights have made of it (MediumRay::throughput).  With `control` the segment's minimum is
-/// split off (spectral decomposition): first control against rest, mu_c against mub - mu_c in the scheme's own measure, and only
-/// the rest costs a lookup.  Unbiased for any mub > 0.  Without history E[X^2] = exp(-int mub (1 - mu_n^2/(mub^2 P_n))), lookups
-/// int mub exp(-int_0^x mub (1 - P_n)); history-aware average has the lookups int mub avg_l T_l(0,x).  On grey media it is
-/// weighted delta tracking.
+/// w_l includes what the path's earlier flights have made of it (MediumRay::throughput).  With `control` an extinction of
+/// each channel is split off (spectral decomposition): first control against rest, mu_c against mub - mu_c in the scheme's own
+/// measure, and only the rest costs a lookup.  Above the segment's minimum residuals may be negative, and weights with them.
+/// Where the albedo varies, the minimum is of the least absorption and scattering that the albedo's bounds allow, and other
+/// controls scatter by the middle of these bounds.  Unbiased for any mub > 0.  Without history E[X^2] = exp(-int mub (1 -
+/// mu_n^2/(mub^2 P_n))), lookups int mub exp(-int_0^x mub (1 - P_n)); history-aware average has the lookups int mub avg_l
+/// T_l(0,x).  On grey media it is weighted delta tracking.
 template <class Value>
 struct SpectralTracking {
   static constexpr const char* kName = "spectral";
@@ -33,33 +35,62 @@ struct SpectralTracking {
   static constexpr bool kNeedsBound = false;
 
   std::string scheme = "history_aware_average", control = "none";
+  std::vector<Real> controls;
 
   void parameters(ParameterVisitor& visit) {
     visit.choice("scheme", scheme, {"maximum", "average", "history_aware_maximum", "history_aware_average"},
                  "what the chances of events are proportional to: coefficients, or weighted coefficients, over the channels");
-    visit.choice("control", control, {"none", "minimum"},
-                 "minimum: collisions of the segment's least extinction take no lookup (spectral decomposition)");
+    visit.choice("control", control, {"none", "minimum", "average", "given"},
+                 "extinction whose collisions take no lookup (spectral decomposition): of the segment's bounds, or given");
+    visit.numbers("controls", controls, 0, kMaxChannels, Range::non_negative(), "1/length",
+                  "control extinction, one for all channels or one each (given)");
   }
+
+  void check(const MatterBounds& medium) const {
+    const auto given = static_cast<Eigen::Index>(controls.size());
+    if ((control == "given") == controls.empty() || (given > 1 && given != medium.minimum.size()))
+      throw ParameterError("controls", "found " + std::to_string(given) + " numbers; control \"given\" takes one, or " +
+                                           std::to_string(medium.minimum.size()) + ", the others take none");
+  }
+
+  SampleRange range() const { return beyond_minimum() ? SampleRange::any_sign : kRange; }
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   /// Collisions of the control are no lookups.
   bool flies_once(int) const { return control == "none"; }
 
+  /// Of a segment: extinctions whose collisions take no lookup, and the most by which the medium's differs from them.
+  struct Control {
+    Value all, absorb, scatter, excess;
+  };
+
   struct RayData : MediumRay<Value> {
     bool by_maximum = false, by_history = false;
-    std::vector<Value> control, excess;  ///< per segment: the control, and the most by which the extinction exceeds it
+    std::vector<Control> control;
   };
 
   void prepare(RayData& ray) const {
     ray.by_maximum = scheme == "maximum" || scheme == "history_aware_maximum";
     ray.by_history = scheme == "history_aware_maximum" || scheme == "history_aware_average";
     ray.control.clear();
-    ray.excess.clear();
     if (control == "none") return;
     for (const Segment& segment : ray.bounds.segments()) {
-      ray.control.push_back(load<Value>(segment.extinction.minimum.data(), ray.channels));
-      ray.excess.push_back(load<Value>(segment.extinction.maximum.data(), ray.channels) - ray.control.back());
+      const Value least = load<Value>(segment.extinction.minimum.data(), ray.channels),
+                  most = load<Value>(segment.extinction.maximum.data(), ray.channels);
+      const Value all = control == "minimum"   ? least
+                        : control == "average" ? load<Value>(segment.extinction.average.data(), ray.channels)
+                                               : given(ray);
+      Control split{all, (1 - ray.albedo) * all, ray.albedo * all, all};
+      if (ray.albedo_field) {
+        const Value low = load<Value>(ray.albedo_field->least(ray.channels).data(), ray.channels);
+        split.scatter = control == "minimum" ? Value(low * all) : Value((low + ray.albedo) / 2 * all);
+        if (control != "minimum") split.absorb = all - split.scatter;
+        split.all = split.absorb + split.scatter;
+      }
+      const Value above = most - split.all, below = split.all - least;
+      split.excess = select(above > below, above, below);
+      ray.control.push_back(split);
     }
   }
 
@@ -75,28 +106,29 @@ struct SpectralTracking {
   bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (walk.kind != EventKind::escape || !flight.next(rng)) return false;
     if (ray.control.empty()) return true;
-    const Value& mu_c = ray.control[flight.piece()];
+    const Control& split = ray.control[flight.piece()];
     walk.lookup_chance = lookup_chance(ray, walk.weight, flight.rate(), flight.piece());
     const Real u = rng.uniform();
     if (u < walk.lookup_chance) return true;
-    const Coefficients<Value> mu(mu_c, ray.albedo, flight.rate());
-    const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : 0,
-               scatter = measure(ray, walk.weight, mu.scatter);
+    const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, split.absorb) : 0,
+               scatter = measure(ray, walk.weight, split.scatter);
     const Real chance = 1 - walk.lookup_chance;
     walk.kind = choose_event((u - walk.lookup_chance) / chance, absorb, scatter, 0);
-    take(walk, ray, mu, flight.rate() * chance, walk.kind, absorb, scatter, 0);
+    take(walk, ray, walk.kind == EventKind::absorb ? split.absorb : split.scatter, flight.rate() * chance,
+         walk.kind == EventKind::absorb ? absorb : scatter, absorb + scatter);
     return false;
   }
 
   void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    Coefficients<Value> mu(extinction, ray.albedo, at.rate());
+    Coefficients<Value> mu(extinction, ray.albedo_at(at.position()), at.rate());
     if (!ray.control.empty()) mu = residual(ray, mu, at.piece());
     const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : 0,
                scatter = measure(ray, walk.weight, mu.scatter), null = measure(ray, walk.weight, mu.null);
     const EventKind kind = choose_event(rng.uniform(), absorb, scatter, null);
     walk.kind = kind;
     walk.looked_up = kind != EventKind::escape;
-    take(walk, ray, mu, at.rate() * walk.lookup_chance, kind, absorb, scatter, null);
+    const Real own = kind == EventKind::absorb ? absorb : kind == EventKind::scatter ? scatter : null;
+    take(walk, ray, mu.of(kind), at.rate() * walk.lookup_chance, own, absorb + scatter + null);
   }
 
   Value result(const Walk& walk, const RayData& ray) const { return walk.kind == EventKind::escape ? walk.weight : ray.value(0); }
@@ -110,24 +142,24 @@ struct SpectralTracking {
     if (!ray.by_history || ray.channels == 1) return theory_without_history(ray, profile, c);
     if (is_constant(ray, profile)) return theory_of_constant(ray, profile, c);
     Theory theory;
-    if (ray.by_maximum || !ray.draws_absorption) return theory;
+    if (ray.by_maximum || !ray.draws_absorption || beyond_minimum()) return theory;
     Real lookups = 0;
     for (int l = 0; l < ray.channels; ++l)
       for (const RayProfile::Node& at : profile.nodes(l)) {
         const Real mub = ray.majorant.rate(at.piece);
         if (at.extinction > mub) return theory;
-        const Real mu_c = ray.control.empty() ? 0 : channel(ray.control[at.piece], l);
+        const Real mu_c = ray.control.empty() ? 0 : channel(ray.control[at.piece].all, l);
         lookups += at.weight * (mub - mu_c) * std::exp(-at.depth) / ray.channels;
       }
     theory.lookups = lookups;
     return theory;
   }
 
-  /// On grey media all weights are 1 where the rate bounds.
+  /// On grey media all weights are 1 where the rate and the control bound.
   Theory weight_theory(const RayData& ray, const RayProfile& profile, int c) const {
     Theory theory = this->theory(ray, profile, c, Quantity::free_path);
     theory.mean = theory.variance = {};
-    if (ray.channels > 1) return theory;
+    if (ray.channels > 1 || beyond_minimum()) return theory;
     for (const RayProfile::Node& at : profile.nodes(0))
       if (at.extinction > ray.majorant.rate(at.piece)) return theory;
     theory.variance = 0;
@@ -135,6 +167,15 @@ struct SpectralTracking {
   }
 
  private:
+  /// Whether residuals may be negative.
+  bool beyond_minimum() const { return control == "average" || control == "given"; }
+
+  Value given(const RayData& ray) const {
+    Value all = ray.value(controls[0]);
+    for (std::size_t c = 1; c < controls.size(); ++c) channel(all, static_cast<int>(c)) = controls[c];
+    return all;
+  }
+
   /// R_k of the scheme.
   static Real measure(const RayData& ray, const Value& weight, const Value& coefficient) {
     const Value x = magnitude(ray.by_history ? Value(ray.throughput * weight * coefficient) : coefficient);
@@ -143,32 +184,27 @@ struct SpectralTracking {
 
   /// The rest is at least what the segment's bounds allow, also under a rate that does not exceed the control.
   static Real lookup_chance(const RayData& ray, const Value& weight, Real mub, std::size_t piece) {
-    const Value& mu_c = ray.control[piece];
-    const Coefficients<Value> mu(mu_c, ray.albedo, mub);
-    Value least = magnitude(mu.null);
-    for (int l = 0; l < ray.channels; ++l) channel(least, l) = std::max(channel(least, l), channel(ray.excess[piece], l));
-    const Real rest = measure(ray, weight, least), own = measure(ray, weight, ray.draws_absorption ? mu_c : mu.scatter);
+    const Control& split = ray.control[piece];
+    Value least = magnitude(Value(mub - split.all));
+    for (int l = 0; l < ray.channels; ++l) channel(least, l) = std::max(channel(least, l), channel(split.excess, l));
+    const Real rest = measure(ray, weight, least), own = measure(ray, weight, ray.draws_absorption ? split.all : split.scatter);
     return own > 0 ? rest / (own + rest) : 1;
   }
 
   static Coefficients<Value> residual(const RayData& ray, Coefficients<Value> mu, std::size_t piece) {
-    const Coefficients<Value> control(ray.control[piece], ray.albedo, 0);
-    mu.absorb -= control.absorb;
-    mu.scatter -= control.scatter;
+    mu.absorb -= ray.control[piece].absorb;
+    mu.scatter -= ray.control[piece].scatter;
     return mu;
   }
 
-  /// w_l *= mu_k,l/(rate P_k); nothing is left where absorption, not an event, took all.
-  static void take(Walk& walk, const RayData& ray, const Coefficients<Value>& mu, Real rate, EventKind kind, Real absorb,
-                   Real scatter, Real null) {
-    const Real own = kind == EventKind::absorb ? absorb : kind == EventKind::scatter ? scatter : null;
-    const Real sum = absorb + scatter + null;
+  /// w_l *= mu_k,l/(rate P_k), with P_k = own / sum; nothing is left where absorption, not an event, took all.
+  static void take(Walk& walk, const RayData& ray, const Value& coefficient, Real rate, Real own, Real sum) {
     if (!(own > 0))
       walk.weight = ray.value(0);
     else if (own * rate < least_normal(rate))  // of extinctions near the least number the product is none
-      walk.weight *= mu.of(kind) / own * (sum / rate);
+      walk.weight *= coefficient / own * (sum / rate);
     else
-      walk.weight *= mu.of(kind) * (sum / (own * rate));
+      walk.weight *= coefficient * (sum / (own * rate));
   }
 
   /// Chances of a lookup and of a null collision at a point, and the null collision's factor of the weights.
@@ -176,10 +212,11 @@ struct SpectralTracking {
     Real lookup = 1, null = 0;
     Value factor;
 
-    Step(const RayData& ray, const Value& weight, const Value& extinction, std::size_t piece) : factor(ray.value(0)) {
+    Step(const RayData& ray, const Value& weight, const Value& extinction, const Value& albedo, std::size_t piece)
+        : factor(ray.value(0)) {
       const Real mub = ray.majorant.rate(piece);
       if (!(mub > 0)) return;
-      Coefficients<Value> mu(extinction, ray.albedo, mub);
+      Coefficients<Value> mu(extinction, albedo, mub);
       if (!ray.control.empty()) {
         lookup = lookup_chance(ray, weight, mub, piece);
         mu = residual(ray, mu, piece);
@@ -201,9 +238,10 @@ struct SpectralTracking {
   static Theory theory_without_history(const RayData& ray, const RayProfile& profile, int c) {
     std::vector<Real> rate, through, death, growth;
     for (std::size_t j = 0; j < profile.nodes(c).size(); ++j) {
-      const std::size_t piece = profile.nodes(c)[j].piece;
+      const RayProfile::Node& at = profile.nodes(c)[j];
+      const std::size_t piece = at.piece;
       const Real mub = ray.majorant.rate(piece);
-      const Step step(ray, ray.value(1), extinction_at(ray, profile, j), piece);
+      const Step step(ray, ray.value(1), extinction_at(ray, profile, j), ray.albedo_at(at.t), piece);
       const Real factor = channel(step.factor, c);
       rate.push_back(mub * step.lookup);
       through.push_back(mub * step.null);
@@ -214,11 +252,13 @@ struct SpectralTracking {
   }
 
   static bool is_constant(const RayData& ray, const RayProfile& profile) {
+    if (ray.albedo_field) return false;
     for (int l = 0; l < ray.channels; ++l)
       for (const RayProfile::Node& at : profile.nodes(l)) {
         const RayProfile::Node& first = profile.nodes(l)[0];
         if (at.extinction != first.extinction || ray.majorant.rate(at.piece) != ray.majorant.rate(first.piece)) return false;
-        if (!ray.control.empty() && channel(ray.control[at.piece], l) != channel(ray.control[first.piece], l)) return false;
+        if (!ray.control.empty() && channel(ray.control[at.piece].all, l) != channel(ray.control[first.piece].all, l))
+          return false;
       }
     return true;
   }
@@ -235,7 +275,7 @@ struct SpectralTracking {
     Real chance = 1, second = 0, lookups = 0, squares = 0;
     const Real last = depth + 12 * std::sqrt(depth) + 40;
     for (Real k = 0; k < last && chance > 0; ++k) {
-      const Step step(ray, weight, extinction, 0);
+      const Step step(ray, weight, extinction, ray.albedo, 0);
       const Real w = channel(weight, c), poisson = std::exp(k * std::log(depth) - depth - log_factorial(k));
       const Real next = boost::math::gamma_p(k + 1, depth) * chance * step.lookup;
       second += poisson * chance * w * w;

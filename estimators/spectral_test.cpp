@@ -34,6 +34,7 @@ struct Chromatic {
   std::unique_ptr<HandWalked<E, Spectrum>> walked(auto set, Real majorant = 4.3) const {
     auto walked = std::make_unique<HandWalked<E, Spectrum>>(with<E, Spectrum>(set), medium, 1, majorant / 4.1);
     walked->ray.albedo = albedo;
+    walked->prepare();
     return walked;
   }
 };
@@ -100,6 +101,7 @@ TEST(Spectral, EventsFollowTheLawPerChannel) {
               std::vector<std::shared_ptr<const Medium>>{linear(0.3, 1), rising_exponential(2, -1), constant(0.8)});
           HandWalked<SpectralTracking, Spectrum> walked(with<SpectralTracking, Spectrum>(set), channels, 1, looseness, 3);
           walked.ray.albedo << 0.2, 0.9, 1;
+          walked.prepare();
           walked.ray.draws_absorption = draws;
           expect_law(walked);
         }

@@ -13,7 +13,11 @@ namespace nullmark {
 /// absolute values, A in sum, and the weight is multiplied by sgn A/(mub - mu_c).  Of several constant controls each is picked
 /// with mu_i/mub at weight 1, so that their sum mu_c alone shows.  Unbiased for any mub > mu_c; all weights are 1 where mu_c <=
 /// mu <= mub, signed elsewhere.  With K = exp(-int mub - A |mu_n|/(mub - mu_c)): E[X^2] = K, lookups int (mub - mu_c)
-/// exp(-int_0^x mub - (mub - mu_c) |mu_n|/A).  Grey media.
+/// exp(-int_0^x mub - (mub - mu_c) |mu_n|/A).
+///
+/// With `control_albedo` a_c the events are five: absorption (1 - a_c) mu_c and scattering a_c mu_c by the control, the residuals
+/// r_a = mu_a - (1 - a_c) mu_c and r_s = mu_s - a_c mu_c of any sign, and null, A = |r_a| + |r_s| + |mu_n|.  Without it
+/// collisions are left to the albedo, which must be constant then, for the control's look nothing up.  Grey media.
 template <class Value>
 struct WeightedDecompositionTracking {
   static constexpr const char* kName = "weighted_decomposition";
@@ -24,26 +28,29 @@ struct WeightedDecompositionTracking {
   static constexpr bool kOwnFlights = true;
 
   std::string control = "minimum";
-  std::vector<Real> controls;
+  std::vector<Real> controls, control_albedo;
 
   void parameters(ParameterVisitor& visit) {
     visit.choice("control", control, {"minimum", "average", "middle", "maximum", "medium_average", "given"},
                  "control extinction: from the segment's bounds, the medium, or given");
     visit.numbers("controls", controls, 0, 16, Range::non_negative(), "1/length", "constant control extinctions (given)");
+    visit.numbers("control_albedo", control_albedo, 0, 1, Range::between(0, 1), "",
+                  "share of the control that scatters: absorption and scattering get residuals of their own");
   }
 
-  void check(const Extrema& medium) const {
+  void check(const MatterBounds& medium) const {
     if (medium.minimum.size() > 1)
       throw ParameterError("type", std::string(kName) + " takes grey media only; expected one channel, found " +
                                        std::to_string(medium.minimum.size()) +
                                        "; \"spectral\" with control \"minimum\" decomposes chromatic media");
     if ((control == "given") == controls.empty())
       throw ParameterError("controls", "control \"given\" takes its extinctions from controls, the others take none");
+    expect_control_albedo(medium, control_albedo);
   }
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  SampleRange range() const { return control == "minimum" ? kRange : SampleRange::any_sign; }
+  SampleRange range() const { return control == "minimum" && control_albedo.empty() ? kRange : SampleRange::any_sign; }
 
   struct RayData : MediumRay<Value> {
     Rates control, rate;
@@ -70,27 +77,32 @@ struct WeightedDecompositionTracking {
   struct Walk {
     Real weight = 1;
     bool done = false, looked_up = false;
+    EventKind kind = EventKind::collision;  ///< of a walk that is done
   };
 
   void init(Walk& walk, const RayData& ray, Flight& flight, auto&) const {
-    walk = {1, false, false};
+    walk = {1, false, false, EventKind::collision};
     flight.start(ray.rate);
   }
 
   bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (walk.done || !flight.next(rng)) return false;
     const Real mu_c = ray.control.rate(flight.piece());
-    if (rng.uniform() * flight.rate() >= mu_c && flight.rate() > mu_c) return true;
+    const Real at = rng.uniform() * flight.rate();
+    if (at >= mu_c && flight.rate() > mu_c) return true;
     walk.done = true;
+    if (!control_albedo.empty()) walk.kind = at < control_albedo[0] * mu_c ? EventKind::scatter : EventKind::absorb;
     return false;
   }
 
   void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Parts part(channel(extinction, 0), ray.control.rate(at.piece()), at.rate());
-    const bool real = rng.uniform() * part.sum < std::abs(part.residual);
+    const Parts part = parts(ray, channel(extinction, 0), at.position(), ray.control.rate(at.piece()), at.rate());
+    const Real chosen = rng.uniform() * part.sum;
+    const bool scattered = chosen < std::abs(part.scatter), real = chosen < part.residual();
     const Real grown = part.sum / (at.rate() - ray.control.rate(at.piece()));
-    walk.weight *= (real ? part.residual : part.null) < 0 ? -grown : grown;
+    walk.weight *= (scattered ? part.scatter : real ? part.absorb : part.null) < 0 ? -grown : grown;
     walk.done = walk.looked_up = real;
+    if (!control_albedo.empty()) walk.kind = scattered ? EventKind::scatter : EventKind::absorb;
   }
 
   Value result(const Walk& walk, const RayData& ray) const { return ray.value(walk.done ? 0 : walk.weight); }
@@ -98,17 +110,17 @@ struct WeightedDecompositionTracking {
   bool samples_events(int channels) const { return channels == 1; }
 
   Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
-    return {walk.done ? EventKind::collision : EventKind::escape, at.position(), ray.value(walk.weight)};
+    return {walk.done ? walk.kind : EventKind::escape, at.position(), ray.value(walk.weight)};
   }
 
   int real_collisions(const Walk& walk, const RayData&) const { return walk.looked_up; }
 
   Theory theory(const RayData& ray, const RayProfile& smooth, int c, Quantity) const {
-    const RayProfile profile = cut_at_levels(smooth, ray.rate, {&ray.rate, &ray.control});
+    const RayProfile profile = cut_at_bends(ray, smooth);
     std::vector<Real> growth, rate, through, death;
     for (const RayProfile::Node& at : profile.nodes(c)) {
       const Real mub = ray.rate.rate(at.piece), mu_c = ray.control.rate(at.piece);
-      const Parts part(at.extinction, mu_c, mub);
+      const Parts part = parts(ray, at.extinction, at.t, mu_c, mub);
       const Real null = std::abs(part.null);
       rate.push_back(mub - mu_c);
       through.push_back(part.sum > 0 ? rate.back() * null / part.sum : 0);
@@ -118,16 +130,16 @@ struct WeightedDecompositionTracking {
     return theory_of_escape_weight(profile, c, rate, through, death, growth);
   }
 
-  /// E[w^2; collision] = int [mu_c + |mu - mu_c| A/(mub - mu_c)] K dx.
+  /// E[w^2; collision] = int [mu_c + (|r_a| + |r_s|) A/(mub - mu_c)] K dx.
   Theory weight_theory(const RayData& ray, const RayProfile& smooth, int c) const {
-    const RayProfile profile = cut_at_levels(smooth, ray.rate, {&ray.rate, &ray.control});
+    const RayProfile profile = cut_at_bends(ray, smooth);
     std::vector<Real> growth, collisions;
     for (const RayProfile::Node& at : profile.nodes(c)) {
       const Real mub = ray.rate.rate(at.piece), mu_c = ray.control.rate(at.piece);
-      const Parts part(at.extinction, mu_c, mub);
+      const Parts part = parts(ray, at.extinction, at.t, mu_c, mub);
       const Real grown = mub > mu_c ? part.sum / (mub - mu_c) : 0;
       growth.push_back(grown * std::abs(part.null) - mub);
-      collisions.push_back(mu_c + grown * std::abs(part.residual));
+      collisions.push_back(mu_c + grown * part.residual());
     }
     Theory theory = this->theory(ray, smooth, c, Quantity::free_path);
     theory.variance = weight_variance(profile, c, growth, collisions);
@@ -135,15 +147,37 @@ struct WeightedDecompositionTracking {
   }
 
  private:
-  /// What a lookup splits into.  Where nothing has changed sign the sum is mub - mu_c itself, so that weights stay 1 to the last
-  /// bit.
+  /// What a lookup splits into; the residual of three events stands for that of absorption.
   struct Parts {
-    Real residual, null, sum;
+    Real scatter, absorb, null, sum;
 
-    Parts(Real mu, Real mu_c, Real mub) : residual(mu - mu_c), null(mub - mu), sum(std::abs(residual) + std::abs(null)) {
-      if (residual >= 0 && null >= 0) sum = mub - mu_c;
-    }
+    Real residual() const { return std::abs(scatter) + std::abs(absorb); }
   };
+
+  /// Where nothing has changed sign the sum is mub - mu_c itself, so that weights stay 1 to the last bit.
+  Parts parts(const RayData& ray, Real mu, Real t, Real mu_c, Real mub) const {
+    Parts part{0, mu - mu_c, mub - mu, 0};
+    if (!control_albedo.empty()) {
+      const Real albedo = channel(ray.albedo_at(t), 0);
+      part.scatter = albedo * mu - control_albedo[0] * mu_c;
+      part.absorb = (1 - albedo) * mu - (1 - control_albedo[0]) * mu_c;
+    }
+    const bool bounding = part.scatter >= 0 && part.absorb >= 0 && part.null >= 0;
+    part.sum = bounding ? mub - mu_c : part.residual() + std::abs(part.null);
+    return part;
+  }
+
+  /// Theories bend where a residual or the null collisions change sign.
+  RayProfile cut_at_bends(const RayData& ray, const RayProfile& smooth) const {
+    const RayProfile profile = cut_at_levels(smooth, ray.rate, {&ray.rate, &ray.control});
+    if (control_albedo.empty()) return profile;
+    const auto sign_of = [&](Real Parts::*part) {
+      return [this, &ray, part](Real t, std::size_t piece, Real mu) {
+        return parts(ray, mu, t, ray.control.rate(piece), ray.rate.rate(piece)).*part > 0;
+      };
+    };
+    return cut_at_changes(cut_at_changes(profile, ray.rate, sign_of(&Parts::scatter)), ray.rate, sign_of(&Parts::absorb));
+  }
 };
 
 }  // namespace nullmark

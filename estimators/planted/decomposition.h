@@ -17,7 +17,7 @@ struct PlantedDecompositionStart : AnalogDecompositionTracking<Value> {
   using Base = AnalogDecompositionTracking<Value>;
   using RayData = typename Base::RayData;
 
-  void check(const Extrema&) const {}
+  void check(const MatterBounds&) const {}
 
   struct Walk : Base::Walk {
     Real collision = 0;
@@ -49,7 +49,7 @@ struct PlantedStaleResidual : WeightedDecompositionTracking<Value> {
   using Base = WeightedDecompositionTracking<Value>;
   using RayData = typename Base::RayData;
 
-  void check(const Extrema&) const {}
+  void check(const MatterBounds&) const {}
 
   struct Walk : Base::Walk {
     Value first;
@@ -90,7 +90,7 @@ struct PlantedDecompositionMarginal : WeightedDecompositionTracking<Value> {
   using RayData = typename Base::RayData;
   using Walk = typename Base::Walk;
 
-  void check(const Extrema&) const {}
+  void check(const MatterBounds&) const {}
 
   void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     Base::consume(walk, ray, at, extinction, rng);

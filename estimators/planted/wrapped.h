@@ -50,9 +50,8 @@ class WrappedSource final : public EstimatorSource {
   SampleRange range(int channels) const override { return honest_.range(channels); }
   bool needs_bound() const override { return honest_.needs_bound(); }
   std::optional<Real> order(Quantity quantity) const override { return honest_.order(quantity); }
-  void check(const Extrema& medium) const override { honest_.check(medium); }
-  std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64,
-                                       bool lanes = true) const override {
+  void check(const MatterBounds& medium) const override { honest_.check(medium); }
+  std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64, bool lanes = true) const override {
     auto honest = honest_.kernel(channels, precision, lanes);
     return honest ? bug_.wrap(std::move(honest)) : nullptr;
   }

@@ -23,29 +23,43 @@ inline RayProfile cut_anew(const RayProfile& profile, std::vector<Real> cuts, co
                     profile.channels(), cuts, ends, rates);
 }
 
+/// Appends the distances at which yes(t, piece, mu_c(t)) changes within a piece.
+template <class Yes>
+void append_changes(const RayProfile& profile, int c, const Yes& yes, std::vector<Real>& cuts) {
+  std::vector<Real> out(static_cast<std::size_t>(profile.channels()));
+  const std::vector<RayProfile::Node>& nodes = profile.nodes(c);
+  for (std::size_t j = 1; j < nodes.size(); ++j) {
+    const RayProfile::Node &before = nodes[j - 1], &after = nodes[j];
+    if (before.piece != after.piece) continue;
+    const bool at_end = yes(after.t, after.piece, after.extinction);
+    if (yes(before.t, before.piece, before.extinction) == at_end) continue;
+    Real low = before.t, high = after.t;
+    for (Real middle = (low + high) / 2; middle > low && middle < high; middle = (low + high) / 2) {
+      profile.extinction(&middle, 1, out.data());
+      (yes(middle, after.piece, out[static_cast<std::size_t>(c)]) == at_end ? high : low) = middle;
+    }
+    cuts.push_back(high);
+  }
+}
+
+/// The profile of a grey medium cut once more where yes(t, piece, mu(t)) changes.
+template <class Yes>
+RayProfile cut_at_changes(const RayProfile& profile, const Rates& pieces, const Yes& yes) {
+  std::vector<Real> cuts(profile.cuts().begin(), profile.cuts().end());
+  const std::size_t before = cuts.size();
+  append_changes(profile, 0, yes, cuts);
+  return cuts.size() == before ? profile : cut_anew(profile, std::move(cuts), pieces);
+}
+
 /// The profile cut once more where an extinction crosses a level that is constant on each piece of the rates: theories with
 /// absolute values of differences bend there.  The profile itself is returned where none does, as under true bounds.
 inline RayProfile cut_at_levels(const RayProfile& profile, const Rates& pieces, std::span<const Rates* const> levels) {
-  const auto channels = static_cast<std::size_t>(profile.channels());
   std::vector<Real> cuts(profile.cuts().begin(), profile.cuts().end());
   const std::size_t before = cuts.size();
-  std::vector<Real> out(channels);
-  for (std::size_t c = 0; c < channels; ++c) {
-    const std::vector<RayProfile::Node>& nodes = profile.nodes(static_cast<int>(c));
-    for (std::size_t j = 1; j < nodes.size(); ++j)
-      for (const Rates* level : levels) {
-        const std::size_t piece = nodes[j].piece;
-        const Real at = level->rate(piece);
-        if (nodes[j - 1].piece != piece || (nodes[j - 1].extinction > at) == (nodes[j].extinction > at)) continue;
-        const bool above = nodes[j].extinction > at;
-        Real low = nodes[j - 1].t, high = nodes[j].t;
-        for (Real middle = (low + high) / 2; middle > low && middle < high; middle = (low + high) / 2) {
-          profile.extinction(&middle, 1, out.data());
-          ((out[c] > at) == above ? high : low) = middle;
-        }
-        cuts.push_back(high);
-      }
-  }
+  for (int c = 0; c < profile.channels(); ++c)
+    for (const Rates* level : levels)
+      append_changes(
+          profile, c, [level](Real, std::size_t piece, Real mu) { return mu > level->rate(piece); }, cuts);
   return cuts.size() == before ? profile : cut_anew(profile, std::move(cuts), pieces);
 }
 

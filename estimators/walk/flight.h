@@ -57,8 +57,7 @@ class Flight {
   Real total_depth() const { return rates_->total_depth(); }
 
  private:
-  // GCC would call it where a file has many kernels.
-  [[gnu::always_inline]] bool fly(auto& rng) {
+  bool fly(auto& rng) {
     const Real depth = depth_ + rng.exponential();
     // Most flights stay in their cell: only those that leave it ask for the rule.
     if (depth < rates_->known(piece_).depth_after) {

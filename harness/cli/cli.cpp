@@ -177,7 +177,7 @@ class CommandLine {
 
   void add_check() {
     CLI::App* command = add("check", "Print verdicts on bias and expected lookups, derived from the results file alone", [this] {
-      refuse_overwriting_data({file_}, {junit_, markdown_});
+      refuse_overwriting_others({file_}, {{junit_, kJunitBeginning}, {markdown_, "### nullmark check"}});
       RunRecord run = load_all({file_})[0];
       const Summary summary = summarise(run, strict_);
       if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
@@ -202,7 +202,7 @@ class CommandLine {
 
   void add_compare() {
     CLI::App* command = add("compare", "Rank estimators by what accuracy costs in time", [this] {
-      refuse_overwriting_data(files_, {markdown_});
+      refuse_overwriting_others(files_, {{markdown_, "### nullmark compare"}});
       const std::vector<RunRecord> runs = load_all(files_);
       const std::string ranking = compare_text(runs, baseline_, paired_);
       if (ranking.empty()) return report(ExitCode::nothing_ran, "no cell of these results was sampled; nothing to compare");
@@ -279,7 +279,7 @@ class CommandLine {
   void add_export() {
     CLI::App* command = add("export", "Write results in another program's format", [this] {
       expect_one_of(format_, export_formats(), "format");
-      refuse_overwriting_data({file_}, {output_});
+      refuse_overwriting_others({file_}, {{output_, export_beginning(format_)}});
       RunRecord run = load_all({file_})[0];
       summarise(run);
       deliver(export_results(run, format_, file_), output_);
@@ -293,7 +293,7 @@ class CommandLine {
   void add_merge() {
     CLI::App* command = add("merge", "Join the results of shards", [this] {
       refuse_overwriting(files_, {output_});
-      expect_new(output_, force_);
+      expect_new(output_, force_, kResultsBeginning);
       deliver(results_text(merge_results(load_all(files_), files_, builds_of(builds_))), output_);
       return ExitCode::ok;
     });
@@ -305,7 +305,7 @@ class CommandLine {
 
   void add_make_volume() {
     CLI::App* command = add("make-volume", "Write a procedural smoke volume (OpenVDB, grid \"density\")", [this] {
-      expect_new(file_, force_);
+      expect_new(file_, force_, " BDV");
       expect_plain_or_none(file_);
       write_procedural_vdb(file_, volume_);
       return ExitCode::ok;

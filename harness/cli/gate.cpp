@@ -11,6 +11,7 @@
 #include "harness/performance_gate/report.h"
 #include "harness/performance_gate/required.h"
 #include "harness/performance_gate/wall_time.h"
+#include "harness/report/junit.h"
 
 namespace nullmark {
 namespace {
@@ -74,7 +75,8 @@ ExitCode update(const GateCommand& command, const Counts& fresh, std::optional<R
 }  // namespace
 
 ExitCode gate_command(const GateCommand& command) {
-  refuse_overwriting_data({command.results, command.baseline, command.blocks}, {command.junit, command.markdown});
+  refuse_overwriting_others({command.results, command.baseline, command.blocks},
+                            {{command.junit, kJunitBeginning}, {command.markdown, "### nullmark gate"}});
   const std::optional<std::vector<Tier>> required = required_tiers(command);
   const Counts fresh = read_counts(command.results);
   std::optional<Real> threshold;

@@ -1,6 +1,7 @@
 // Small files that ask for much: refused in one line, before memory or the stack is gone.
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 
@@ -230,15 +231,27 @@ TEST_F(HostileFiles, OutputsReplaceOnlyTheirKind) {
   ASSERT_EQ(run("make-volume v.vdb --resolution 8"), 0) << read("err");
   const std::string kept = read("r.json"), config_text = read("c.json"), volume = read("v.vdb");
   write("other.json", kept);
-  for (const char* output : {"other.json", "c.json", "v.vdb"})
+  write("spaced.json", "{ \"nullmark\" : \"config/2\", \"experiments\": []}");
+  write("notes.txt", "precious");
+  write("pom.xml", "<project/>");
+  for (const char* output : {"other.json", "c.json", "v.vdb", "spaced.json", "notes.txt", "pom.xml"})
     for (const std::string& command :
          {fmt::format("report r.json -o {}", output), fmt::format("export r.json --format csv -o {}", output),
           fmt::format("export r.json --format jsonl -o {}", output), fmt::format("check r.json --junit {}", output),
           fmt::format("check r.json --markdown {}", output), fmt::format("compare r.json --markdown {}", output)}) {
       EXPECT_EQ(run(command), static_cast<int>(ExitCode::input_error)) << command;
-      EXPECT_NE(read("err").find("which this output would replace; give the output another path"), std::string::npos)
+      EXPECT_NE(read("err").find("exists and is no earlier output of this kind; remove it, or give the output another path"),
+                std::string::npos)
           << command << ": " << read("err");
     }
+  // Nor does --force replace what is no results file, or no volume.
+  for (const char* output : {"c.json", "v.vdb", "spaced.json", "notes.txt"})
+    EXPECT_EQ(run(fmt::format("run c.json -o {} --force --no-timing", output)), static_cast<int>(ExitCode::input_error))
+        << output;
+  for (const char* output : {"c.json", "other.json", "notes.txt"})
+    EXPECT_EQ(run(fmt::format("make-volume {} --resolution 8 --force", output)), static_cast<int>(ExitCode::input_error))
+        << output;
+  EXPECT_EQ(read("notes.txt"), "precious");
   EXPECT_EQ(read("other.json"), kept);
   EXPECT_EQ(read("c.json"), config_text);
   EXPECT_EQ(read("v.vdb"), volume);
@@ -260,6 +273,15 @@ TEST_F(HostileFiles, ConfigurationsAreNoLargerThanTheirCellsNeed) {
   EXPECT_EQ(read("err"), "nullmark: c.json: holds more than 64 MiB; expected a configuration\n");
   EXPECT_EQ(run("run - --dry-run", NULLMARK_PROGRAM, "c.json"), static_cast<int>(ExitCode::input_error));
   EXPECT_EQ(read("err"), "nullmark: <stdin>: holds more than 64 MiB; expected a configuration\n");
+}
+
+/// To a pipe that has a name nobody may ever write.
+TEST_F(HostileFiles, PipesWithoutAWriterEndAtOnce) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  for (const char* command : {"check pipe", "run pipe -o q.json"}) {
+    EXPECT_EQ(run(fmt::format("{}", command)), static_cast<int>(ExitCode::input_error)) << command;
+    EXPECT_NE(read("err").find("pipe:1:1: is empty"), std::string::npos) << read("err");
+  }
 }
 
 /// Root may read everything, so the program runs without that right.

@@ -117,7 +117,7 @@ ExitCode judge_as_pictures(const JudgeCommand& command, const ProblemScene& scen
 
 ExitCode judge_command(const JudgeCommand& command) {
   refuse_overwriting({command.samples}, {command.output});
-  expect_new(command.output, command.force);
+  expect_new(command.output, command.force, kResultsBeginning);
   expect_threads(0);
   const ProblemScene scene = ProblemScene::read(command.problem, command.scene);
   catch_signals();

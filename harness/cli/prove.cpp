@@ -91,7 +91,7 @@ ExitCode prove_medium_alone(const ProveCommand& command, std::string& text) {
 ExitCode prove_command(const ProveCommand& command) {
   take_consent(command.allow_foreign);
   refuse_overwriting({}, {command.output});
-  expect_new(command.output, command.force);
+  expect_new(command.output, command.force, kResultsBeginning);
   expect_threads(command.threads);
   std::string text;
   ExitCode medium_exit = ExitCode::ok;

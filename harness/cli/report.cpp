@@ -15,7 +15,7 @@
 namespace nullmark {
 
 ExitCode report_command(const ReportCommand& command) {
-  refuse_overwriting_data(command.results, {command.output, command.markdown});
+  refuse_overwriting_others(command.results, {{command.output, page_beginning()}, {command.markdown, "### nullmark compare"}});
   if (!command.figures.empty()) expect_figures_possible(command.figures);
   std::vector<RunRecord> runs;
   for (const std::string& file : command.results) runs.push_back(read_results(read_file(file), file));

@@ -154,7 +154,7 @@ std::vector<std::string> inputs_of(const std::vector<ConfigSource>& sources, con
         } catch (const MissingData&) {
           // Then there is no file to protect.
         }
-    for (const auto* others : {&medium.per_channel, &medium.emission_field})
+    for (const auto* others : {&medium.per_channel, &medium.emission_field, &medium.albedo_field})
       for (const MediumSpec& other : *others) add(other);
   };
   for (const MediumSpec& medium : plan.media) add(medium);
@@ -185,6 +185,7 @@ std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vect
   refuse_overwriting(inputs_of(sources, plan), {output, Journal::path_for(output)});
   if (std::error_code error; std::filesystem::is_directory(output, error))
     throw InputError(output + ": is a folder; expected the path of a results file");
+  if (command.force) expect_new(output, true, kResultsBeginning);
   using Mode = Journal::Mode;
   auto journal = std::make_unique<Journal>(output, config_hash(plan.config_text),
                                            command.resume  ? Mode::resume

@@ -63,6 +63,12 @@ std::vector<std::string> words(const JsonNode& node) {
   return list;
 }
 
+/// Such as the name of a file, which messages show.
+std::string text(const JsonNode& node) {
+  if (node.string() != printable(node.string())) node.expected("a text without control characters");
+  return node.string();
+}
+
 ParameterValue read_value(const ParameterInfo& parameter, const JsonNode& node) {
   switch (parameter.default_value.index()) {
     case 0:
@@ -73,7 +79,7 @@ ParameterValue read_value(const ParameterInfo& parameter, const JsonNode& node) 
       return node.boolean();
     case 3:
       if (parameter.object) return object_text(node);
-      return parameter.allowed.empty() ? node.string() : node.one_of(parameter.allowed, parameter.name.c_str());
+      return parameter.allowed.empty() ? text(node) : node.one_of(parameter.allowed, parameter.name.c_str());
     case 4:
       return numbers_within(node, static_cast<std::size_t>(parameter.least), static_cast<std::size_t>(parameter.most),
                             parameter.range, parameter.unit);
@@ -179,6 +185,11 @@ void complete(MediumSpec& medium);
 
 void add_matter_label(MediumSpec& medium) {
   if (!medium.albedo.empty()) medium.label += "/albedo:" + to_text(medium.albedo);
+  for (MediumSpec& field : medium.albedo_field) {
+    complete(field);
+    medium.optional |= field.optional;
+    medium.label += fmt::format("/albedo:({})", field.label);
+  }
   if (medium.anisotropy != 0) medium.label += "/anisotropy:" + to_text(medium.anisotropy);
   if (!medium.emission.empty()) medium.label += "/emission:" + to_text(medium.emission);
   for (MediumSpec& field : medium.emission_field) {
@@ -217,7 +228,12 @@ Real read_anisotropy(const JsonNode& node) {
 /// What the media do to light beside removing it.
 std::vector<MediumSpec> with_matter(std::vector<MediumSpec> media, const JsonNode& node) {
   if (!node.json().is_object()) return media;
-  if (node.has("albedo")) {
+  if (node.has("albedo") && node["albedo"].json().is_object()) {
+    node["albedo"].expect_keys({"field"});
+    const std::vector<MediumSpec> fields = read_given_media(node["albedo"]["field"]);
+    if (fields.size() != 1) node["albedo"]["field"].expected("one medium, not a sweep");
+    for (MediumSpec& medium : media) medium.albedo_field = fields;
+  } else if (node.has("albedo")) {
     std::vector<std::vector<Real>> albedos;
     for (const JsonNode& albedo : swept(node["albedo"], true)) albedos.push_back(read_per_channel(albedo, 1));
     media = crossed(node, media, albedos, [](MediumSpec& medium, const std::vector<Real>& albedo) { medium.albedo = albedo; });
@@ -263,9 +279,14 @@ std::vector<MediumSpec> read_given_media(const JsonNode& node) {
       const std::vector<MediumSpec> variants = read_given_media(channel);
       if (!variants[0].spectrum.empty() || !variants[0].per_channel.empty())
         channel.fail(fmt::format("its medium must be grey; expected neither \"spectrum\" nor \"{0}\" inside \"{0}\"", type));
-      if (!variants[0].albedo.empty() || !variants[0].emission.empty() || variants[0].anisotropy != 0)
+      if (!variants[0].albedo_field.empty() || !variants[0].emission.empty() || variants[0].anisotropy != 0)
         channel.fail(
-            fmt::format("\"albedo\", \"anisotropy\" and \"emission\" belong to the whole; expected them beside \"media\""));
+            "a field of \"albedo\", \"anisotropy\" and \"emission\" belong to the whole; expected them beside \"media\"");
+      const bool scatters =
+          std::any_of(variants.begin(), variants.end(), [](const MediumSpec& one) { return !one.albedo.empty(); });
+      if (scatters && type != kSum) channel.fail("\"albedo\" belongs to the whole; expected it beside \"media\"");
+      if (scatters && node.has("albedo"))
+        channel.fail("\"albedo\" of a component and of the whole exclude each other; expected the one or the other");
       media = crossed(node, media, variants,
                       [](MediumSpec& medium, const MediumSpec& variant) { medium.per_channel.push_back(variant); });
     }
@@ -339,6 +360,7 @@ bool matches(const MediumSpec& pattern, const MediumSpec& medium) {
   if (!matches(pattern.field, medium.field)) return false;
   if (!pattern.spectrum.empty() && pattern.spectrum != medium.spectrum) return false;
   if (!pattern.albedo.empty() && pattern.albedo != medium.albedo) return false;
+  if (!pattern.albedo_field.empty() && pattern.albedo_field != medium.albedo_field) return false;
   if (pattern.anisotropy != 0 && pattern.anisotropy != medium.anisotropy) return false;
   if (!pattern.emission.empty() && pattern.emission != medium.emission) return false;
   return pattern.per_channel.empty() ||

@@ -44,7 +44,8 @@ Json range_schema(const Range& range) {
 void add_matter_schema(Json& properties) {
   const Json number = {{"type", "number"}, {"minimum", 0}};
   const Json albedo = one_or_list_schema(Json{{"type", "number"}, {"minimum", 0}, {"maximum", 1}});
-  properties["albedo"] = described(one_or_list_schema(albedo), "mu_s / mu, one for all channels or one each");
+  properties["albedo"] = {{"anyOf", {one_or_list_schema(albedo), closed_object({{"field", reference("medium")}}, {"field"})}},
+                          {"description", "mu_s / mu, one for all channels or one each; or a medium whose extinction it is"}};
   properties["anisotropy"] =
       one_or_list_schema(described({{"type", "number"}, {"exclusiveMinimum", -1}, {"exclusiveMaximum", 1}, {"default", 0}},
                                    "mean cosine of the Henyey-Greenstein phase function"));

@@ -25,7 +25,7 @@ class ForeignSource : public EstimatorSource {
     const Real told = describe(quantity, 1).order;
     return told > 0 ? std::optional(told) : std::nullopt;
   }
-  void check(const Extrema&) const override {}
+  void check(const MatterBounds&) const override {}
   std::unique_ptr<const Kernel> kernel(int channels, Precision precision, bool) const override {
     if (precision == Precision::float32) return nullptr;
     return make_foreign_kernel(shared(), channels);

@@ -151,7 +151,7 @@ class ForeignKernel final : public Kernel {
                                          event.distance, context.index, context.world.begin, context.world.end));
       state.host.record_end(k, event.kind, event.distance);
       score_free_path(
-          event, context, channels, [&] { return state.host.rng(k).uniform() < context.albedo[0]; }, &values[k * outputs]);
+          event, context, channels, [&](Real) { return state.host.rng(k).uniform() < context.albedo[0]; }, &values[k * outputs]);
     }
   }
 

@@ -152,7 +152,7 @@ class SamplesSource final : public EstimatorSource {
   SampleRange range(int) const override { return range_named(range_); }
   bool needs_bound() const override { return false; }
   std::optional<Real> order(Quantity) const override { return std::nullopt; }
-  void check(const Extrema&) const override {}
+  void check(const MatterBounds&) const override {}
 
   std::unique_ptr<const Kernel> kernel(int channels, Precision precision, bool) const override {
     if (precision == Precision::float32) return nullptr;

@@ -139,6 +139,7 @@ void visit_fields(Visit& visit, MediumSpec& medium) {
   visit.sparse("spectrum", medium.spectrum);
   visit.sparse("media", MediaField{medium.per_channel});
   visit.sparse("albedo", PerChannelField{medium.albedo, 1});
+  visit.sparse("albedo_field", MediaField{medium.albedo_field});
   visit.sparse("anisotropy", medium.anisotropy);
   visit.sparse("emission", EmissionField{medium});
   visit.sparse("optional", medium.optional);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "harness/model/metrics.h"
 
@@ -21,6 +23,14 @@ class Comparison {
     if (drawn < 1 || drawn > record_.rays || record_.samples % each != 0)
       fail("samples", fmt::format("{} samples of {} rays with {} each", record_.samples, record_.rays, each));
     const auto samples = static_cast<Real>(record_.samples);
+    if (record_.nonfinite > 0) fail("nonfinite", fmt::format("{} samples that are not finite, and status ok", record_.nonfinite));
+    if ((record_.majorant_violations > 0) != record_.largest_violation.has_value())
+      fail("majorant_violations",
+           fmt::format("{} violations, and {} largest one", record_.majorant_violations, record_.largest_violation ? "a" : "no"));
+    if (record_.null_collisions_per_sample && record_.lookups_per_sample &&
+        *record_.null_collisions_per_sample > *record_.lookups_per_sample * (1 + kRounding))
+      fail("null_collisions_per_sample", fmt::format("{:.6g} null collisions of {:.6g} lookups a sample",
+                                                     *record_.null_collisions_per_sample, *record_.lookups_per_sample));
     expect("lookups_per_sample", record_.lookups_per_sample, static_cast<Real>(record_.lookups) / samples, "lookups / samples");
     expect("rng_draws_per_sample", record_.draws_per_sample, static_cast<Real>(record_.draws) / samples, "rng_draws / samples");
     if (record_.verdict) expect_counts(*record_.verdict, drawn);
@@ -31,7 +41,9 @@ class Comparison {
     if (channel.mean && channel.reference && channel.bias)
       expect("bias", channel.bias, *channel.mean - *channel.reference, "the mean less the reference",
              std::abs(*channel.mean) + std::abs(*channel.reference));
-    if (channel.rmse && channel.bias && *channel.rmse < std::abs(*channel.bias) * (1 - kRounding))
+    // The square of a smaller error is none.
+    constexpr Real kLeast = 1e-150;
+    if (channel.rmse && channel.bias && *channel.rmse < std::abs(*channel.bias) * (1 - kRounding) - kLeast)
       fail("rmse", fmt::format("rmse {:.6g}, below the bias {:.6g}", *channel.rmse, *channel.bias));
     const Real most = static_cast<Real>(record_.samples) * (1 + kRounding);
     if (channel.kurtosis && !(*channel.kurtosis >= 1 - kRounding && *channel.kurtosis <= most))
@@ -57,8 +69,13 @@ class Comparison {
   }
 
   void expect_counts(const VerdictRecord& verdict, std::uint64_t drawn) const {
+    if (verdict.out_of_range > verdict.samples_per_ray * drawn * record_.channel.size())
+      fail("verdict", fmt::format("{} samples out of range, more than there are", verdict.out_of_range));
+    std::set<std::pair<int, int>> seen;
     for (const TestRecord& test : verdict.tests)
-      if (test.group < 0 && test.samples != verdict.samples_per_ray * drawn)
+      if (test.channel >= static_cast<int>(record_.channel.size()) || !seen.emplace(test.channel, test.group).second)
+        fail("verdict", fmt::format("a test of channel {} that does not exist, or a second one", test.channel));
+      else if (test.group < 0 && test.samples != verdict.samples_per_ray * drawn)
         fail("verdict",
              fmt::format("a test of {} samples, and {} in each of {} rays", test.samples, verdict.samples_per_ray, drawn));
   }
@@ -87,6 +104,10 @@ class Comparison {
 }  // namespace
 
 void expect_consistent(const CellRecord& record, const JsonNode& cell) {
+  if (record.status == Status::skipped && record.samples > 0)
+    cell["samples"].fail(
+        fmt::format("found {} samples of a cell that was skipped; the file was changed, or is damaged: make the results again",
+                    record.samples));
   if (record.status != Status::ok) return;
   const Comparison comparison(record, cell);
   comparison.expect_counts();

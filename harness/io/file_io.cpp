@@ -5,8 +5,10 @@
 #include <unistd.h>
 
 #include <boost/iostreams/device/array.hpp>
+#include <boost/iostreams/device/file_descriptor.hpp>
 #include <boost/iostreams/filter/gzip.hpp>
 #include <boost/iostreams/filtering_stream.hpp>
+#include <boost/iostreams/stream.hpp>
 #include <cerrno>
 #include <charconv>
 #include <csignal>
@@ -104,11 +106,14 @@ std::string read_stream(std::istream& in, const std::string& path, std::size_t m
 std::string read_file(const std::string& path, std::size_t most) {
   std::error_code error;
   if (fs::is_directory(path, error)) throw InputError(path + ": is a folder; expected a file");
-  std::ifstream in(path, std::ios::binary);
-  if (const int reason = errno; !in)
+  if (fs::is_regular_file(path, error)) expect_at_most(fs::file_size(path, error), most, path, "holds");
+  // Nobody may ever write to a pipe that has a name: one that waits for no writer ends at once.
+  const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  const int reason = errno;
+  if (file < 0 || ::fcntl(file, F_SETFL, 0) != 0)
     throw InputError(reason == ENOENT ? path + ": no such file"
                                       : fmt::format("{}: cannot be read: {}; expected a file", path, std::strerror(reason)));
-  if (fs::is_regular_file(path, error)) expect_at_most(fs::file_size(path, error), most, path, "holds");
+  boost::iostreams::stream<boost::iostreams::file_descriptor_source> in(file, boost::iostreams::close_handle);
   std::string text = read_stream(in, path, most);
   return text.rfind("\x1f\x8b", 0) == 0 ? unpacked(text, path, most) : text;
 }

@@ -30,21 +30,12 @@ bool same_file(const std::string& a, const std::string& b) {
 
 bool is_file(const std::string& path) { return !path.empty() && path != "-"; }
 
-/// What a file holds, if no page, table or report begins like it; else empty.
-std::string data_in(const std::string& path) {
-  constexpr std::size_t kBeginning = 4096;
-  std::string text(kBeginning, '\0');
+/// Whether a file is empty or begins so.
+bool begins_with(const std::string& path, const std::string& beginning) {
+  std::string text(beginning.size(), '\0');
   std::ifstream in(path, std::ios::binary);
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
-  const bool object = first != std::string::npos && text[first] == '{';
-  for (const char* key : {"\"nullmark\":", "\"nullmark_journal\":", "\"nullmark_baseline\":"})
-    if (object && text.find(key) != std::string::npos) return "a configuration or results";
-  for (const auto& [magic, what] :
-       {std::pair{"\x1f\x8b", "packed data"}, {" BDV", "a volume"}, {"\x93NUMPY", "samples"}, {"\x76\x2f\x31\x01", "an image"}})
-    if (text.starts_with(magic)) return what;
-  return "";
+  return in.gcount() == 0 || text == beginning;
 }
 
 }  // namespace
@@ -70,18 +61,23 @@ void refuse_overwriting(const std::vector<std::string>& inputs, const std::vecto
   }
 }
 
-void refuse_overwriting_data(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
-  refuse_overwriting(inputs, outputs);
-  for (const std::string& output : outputs) {
+void refuse_overwriting_others(const std::vector<std::string>& inputs, const std::vector<TextOutput>& outputs) {
+  std::vector<std::string> paths;
+  for (const TextOutput& output : outputs) paths.push_back(output.path);
+  refuse_overwriting(inputs, paths);
+  for (const auto& [path, beginning] : outputs) {
     std::error_code error;
-    if (!is_file(output) || !fs::is_regular_file(output, error)) continue;
-    if (const std::string data = data_in(output); !data.empty())
-      throw InputError(fmt::format("{}: holds {}, which this output would replace; give the output another path", output, data));
+    if (is_file(path) && fs::is_regular_file(path, error) && !begins_with(path, beginning))
+      throw InputError(path + ": exists and is no earlier output of this kind; remove it, or give the output another path");
   }
 }
 
-void expect_new(const std::string& output, bool force) {
-  if (is_file(output) && !force && fs::exists(output)) throw InputError(output + ": exists; --force replaces it");
+void expect_new(const std::string& output, bool force, const std::string& beginning) {
+  std::error_code error;
+  if (!is_file(output) || !fs::exists(output, error)) return;
+  if (!force) throw InputError(output + ": exists; --force replaces it");
+  if (fs::is_regular_file(output, error) && !begins_with(output, beginning))
+    throw InputError(output + ": exists and is nothing that --force replaces here; remove it, or give the output another path");
 }
 
 }  // namespace nullmark

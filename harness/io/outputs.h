@@ -9,11 +9,16 @@ namespace nullmark {
 /// among the inputs stand for their *.json files; "" and "-" are ignored.
 void refuse_overwriting(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
 
-/// The same of pages, tables and reports, which a command makes again at any time and which replace earlier ones.  Throws
-/// InputError as well if an output would replace a file of another kind: a configuration, results, samples or a volume.
-void refuse_overwriting_data(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
+/// A page, table or report: a command makes it again at any time, so it replaces an earlier one.
+struct TextOutput {
+  std::string path, beginning;  ///< what every such text begins with
+};
 
-/// Throws InputError if a file that holds measurements exists and `force` is false.  "" and "-" are ignored.
-void expect_new(const std::string& output, bool force);
+/// The same, and throws InputError as well if an output would replace a file that does not begin like it.
+void refuse_overwriting_others(const std::vector<std::string>& inputs, const std::vector<TextOutput>& outputs);
+
+/// Throws InputError if a file exists and `force` is false, or if it does not begin like those that `force` replaces.  "" and "-"
+/// are ignored.
+void expect_new(const std::string& output, bool force, const std::string& beginning);
 
 }  // namespace nullmark

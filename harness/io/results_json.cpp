@@ -67,7 +67,14 @@ RunRecord read_results(const std::string& text, const std::string& file) {
   if (!top["config"].json().is_null()) run.config_text = top["config"].json().dump();
   top["provenance"].expect_object();
   for (const auto& [key, value] : top["provenance"].json().items()) run.provenance[key] = value.dump();
-  std::set<std::pair<std::string, std::string>> seen;
+  if (top.has("config_hash") && !run.config_text.empty() && top["config_hash"].string() != config_hash(run.config_text))
+    top["config_hash"].fail(
+        "does not fit the configuration in the file; the file was changed, or is damaged: make the results again");
+  // As many as configurations may have.
+  constexpr std::size_t kMost = 100'000;
+  if (top["cells"].json().size() > kMost)
+    top["cells"].fail(fmt::format("found {} cells; expected at most {}", top["cells"].json().size(), kMost));
+  std::set<std::string> seen;
   for (const JsonNode& cell : top["cells"].elements()) {
     run.cells.push_back(read_cell(cell));
     CellRecord& record = run.cells.back();
@@ -75,7 +82,8 @@ RunRecord read_results(const std::string& text, const std::string& file) {
     for (std::string* name : {&record.cell.name, &record.cell.experiment, &record.cell.estimator.label, &record.medium.label,
                               &record.majorant.label, &record.ray_set.label})
       *name = printable(*name);
-    if (!seen.emplace(record.cell.id, record.cell.name).second)
+    record.reason = one_line(record.reason);
+    if (!seen.insert(record.cell.name).second)
       cell.fail(fmt::format("found \"{}\" a second time; expected each cell once", record.cell.name));
   }
   if (top.has("tables")) run.tables = read_tables(top["tables"], CellReader());

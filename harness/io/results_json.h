@@ -20,6 +20,9 @@ Json cell_schema();
 
 /// The text of a results file, one cell per line.
 void write_results(const RunRecord& run, const TextSink& to);
+
+/// What results files begin with, of whatever version of their keys.
+inline constexpr const char* kResultsBeginning = "{\n\"nullmark\": \"results/";
 /// The same to a file, atomically.  Throws InputError if it cannot be written.
 void write_results(const RunRecord& run, const std::string& path);
 std::string results_text(const RunRecord& run);

@@ -73,6 +73,7 @@ Json medium_json(const MediumSpec& medium) {
 
 void add_matter(Json& json, const MediumSpec& medium) {
   if (!medium.albedo.empty()) json["albedo"] = medium.albedo;
+  if (!medium.albedo_field.empty()) json["albedo"] = {{"field", medium_json(medium.albedo_field[0])}};
   if (medium.anisotropy != 0) json["anisotropy"] = medium.anisotropy;
   if (medium.emission.empty()) return;
   json["emission"] = {{"radiance", medium.emission}};

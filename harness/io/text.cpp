@@ -142,7 +142,7 @@ std::string characters_of_xml(const std::string& text) {
 
 std::string xml(const std::string& text) {
   std::string result;
-  for (const char c : characters_of_xml(text)) switch (c) {
+  for (const char c : characters_of_xml(plain_text(text))) switch (c) {
       case '&':
         result += "&amp;";
         break;

@@ -50,7 +50,7 @@ TEST(Text, MarkdownKeepsItsTablesAndBeginsNoHtml) {
 }
 
 TEST(Text, XmlHoldsOnlyItsCharacters) {
-  EXPECT_EQ(xml("a<b>&\"c\"\x1b"), "a&lt;b&gt;&amp;&quot;c&quot; ");
+  EXPECT_EQ(xml("a<b>&\"c\"\x1b"), "a&lt;b&gt;&amp;&quot;c&quot;\\x1b");
   EXPECT_EQ(xml("\xef\xbf\xbe|\xef\xbf\xbf|\xef\xbf\xbd"), "\xef\xbf\xbd|\xef\xbf\xbd|\xef\xbf\xbd");
   EXPECT_EQ(xml("cut \xc3"), "cut \xef\xbf\xbd");
 }

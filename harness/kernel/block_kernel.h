@@ -75,7 +75,8 @@ class BlockKernel : public Kernel {
     if (context.exact_depth) ray.exact_depth = load<Value>(context.exact_depth->data(), channels_);
     ray.knots.assign(context.knots.begin(), context.knots.end());
     prepare_ray<Traits>(ray, medium, extrema, context.world, state.local, channels_);
-    if (context.albedo.size() > 0) ray.albedo = load<Value>(context.albedo.data(), channels_);
+    if (context.albedo.size() > 0)
+      ray.set_albedo(load<Value>(context.albedo.data(), channels_), context.albedo_field, context.world);
     if constexpr (Traits::kPrepare) estimator_.prepare(ray);
   }
 
@@ -254,7 +255,7 @@ class BlockKernel : public Kernel {
     if constexpr (Traits::kEvent)
       score_free_path(
           estimator_.event(state.walk[k], ray, state.flight[k]), context, static_cast<std::size_t>(channels_),
-          [&] { return state.rng[k].uniform() < channel(ray.albedo, 0); }, values);
+          [&](Real t) { return state.rng[k].uniform() < channel(ray.albedo_at(t), 0); }, values);
   }
 
   void finish(State& state, const RayData& ray, std::uint32_t k, Quantity quantity, const PreparedRay& context,

@@ -34,7 +34,7 @@ class EstimatorTemplate final : public EstimatorSource {
     if constexpr (Traits::kOrder) return grey_.order(quantity);
     return std::nullopt;
   }
-  void check(const Extrema& medium) const override {
+  void check(const MatterBounds& medium) const override {
     if constexpr (Traits::kCheck) grey_.check(medium);
   }
   std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64, bool lanes = true) const override {

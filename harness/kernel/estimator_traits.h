@@ -62,7 +62,7 @@ struct EstimatorTraits {
   using RayData = typename detail::RayDataOf<E, Value>::type;
   using Walk = typename E::Walk;
 
-  static constexpr bool kCheck = requires(const E& e, const Extrema& medium) { e.check(medium); };
+  static constexpr bool kCheck = requires(const E& e, const MatterBounds& medium) { e.check(medium); };
   static constexpr bool kComponent = requires(const E& e, const Walk& walk) {
     { e.component(walk) } -> std::convertible_to<int>;
   };
@@ -178,7 +178,7 @@ consteval bool expect_estimator() {
           { e.result(walk, ray) } -> std::convertible_to<Value>;
         },
         "a tracker needs: Value result(const Walk&, const RayData&) const");
-    NULLMARK_EXPECT_SIGNATURE(check, Traits::kCheck, "void check(const Extrema& medium) const");
+    NULLMARK_EXPECT_SIGNATURE(check, Traits::kCheck, "void check(const MatterBounds& medium) const");
     NULLMARK_EXPECT_SIGNATURE(component, Traits::kComponent, "int component(const Walk&) const");
     NULLMARK_EXPECT_SIGNATURE(count_law, Traits::kCountLaw,
                               "CountLaw count_law(const RayData&, const RayProfile&, int channel) const");

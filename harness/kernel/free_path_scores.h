@@ -15,9 +15,9 @@ inline std::size_t free_path_outputs(const Spectrum& albedo, std::size_t channel
 }
 
 /// Scores of a free path: its weight in the bin of its collision, in scatter if it scatters, in escape if it escapes, and in
-/// weight.  `scatters_here()` chooses for collisions of open kind; samplers that leave the kind open are grey.
+/// weight.  `scatters_at(t)` chooses for collisions of open kind; samplers that leave the kind open are grey.
 template <class Value, class Choice>
-void score_free_path(const Event<Value>& event, const PreparedRay& context, std::size_t channels, Choice&& scatters_here,
+void score_free_path(const Event<Value>& event, const PreparedRay& context, std::size_t channels, Choice&& scatters_at,
                      Real* values) {
   std::fill(values, values + free_path_outputs(context.albedo, channels), Real{0});
   Real* const scattered = values + kFreePathBins * channels;
@@ -29,7 +29,8 @@ void score_free_path(const Event<Value>& event, const PreparedRay& context, std:
   const auto cell = std::clamp<std::ptrdiff_t>(after - context.marks.begin() - 1, 0, kFreePathCells - 1);
   store(event.weight, values + static_cast<std::size_t>(cell) / (kFreePathCells / kFreePathBins) * channels);
   if (!scatters(context.albedo)) return;
-  if (event.kind == EventKind::scatter || (event.kind == EventKind::collision && scatters_here())) store(event.weight, scattered);
+  if (event.kind == EventKind::scatter || (event.kind == EventKind::collision && scatters_at(event.distance)))
+    store(event.weight, scattered);
 }
 
 }  // namespace nullmark

@@ -16,10 +16,11 @@ struct PreparedRay {
   Ray world, local;  ///< cut to the medium
   std::uint32_t index = 0;
   RayBounds bounds;
-  std::vector<Real> knots;              ///< sorted, with begin and end; filled only when the kernel needs them
-  std::optional<Spectrum> exact_depth;  ///< filled only when the kernel needs it
-  Spectrum albedo;                      ///< mu_s / mu per channel; empty: 0
-  std::span<const Real> marks;          ///< distances of a profile or of the bins of a free path, ascending
+  std::vector<Real> knots;                    ///< sorted, with begin and end; filled only when the kernel needs them
+  std::optional<Spectrum> exact_depth;        ///< filled only when the kernel needs it
+  Spectrum albedo;                            ///< mu_s / mu per channel, its most where it varies; empty: 0
+  const AlbedoField* albedo_field = nullptr;  ///< where it varies in space
+  std::span<const Real> marks;                ///< distances of a profile or of the bins of a free path, ascending
 };
 
 /// Number of distances of a transmittance profile; of bins of a free path; of bins in the tests of its law.
@@ -186,7 +187,7 @@ class EstimatorSource {
   /// Convergence order of a consistent estimator; empty if none is stated.
   virtual std::optional<Real> order(Quantity) const = 0;
   /// Throws ParameterError if the parameters do not fit the medium.
-  virtual void check(const Extrema& medium) const = 0;
+  virtual void check(const MatterBounds& medium) const = 0;
   /// Null if there is none in this precision.  `lanes`: walks may run side by side in registers.
   virtual std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64,
                                                bool lanes = true) const = 0;

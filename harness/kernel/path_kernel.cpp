@@ -52,7 +52,8 @@ class PathKernel final : public RadianceKernel {
 
   void begin_ray(Workspace& workspace, const Medium& medium, const Extrema&, const PreparedRay& context) const override {
     State& state = static_cast<State&>(workspace);
-    state.path_scene = {&medium, &extrema_, scene_.majorant.get(), channels_, albedo_, kEffects.emission};
+    state.path_scene = {&medium,          &extrema_, scene_.majorant.get(), channels_, albedo_, scene_.albedo_field.get(),
+                        kEffects.emission};
     state.camera_ray = camera_ray(context);
     begin_leg(state, state.camera, *walker_, state.camera_ray);
   }
@@ -115,7 +116,7 @@ class PathKernel final : public RadianceKernel {
         return radiance;
       }
       const Vec3 point = leg->sight.world.at(event.distance);
-      if (!scatters(event.kind, throughput, rng)) {
+      if (!scatters(event.kind, point, throughput, rng)) {
         if constexpr (kEffects.emission) radiance += throughput * scene_.emission.at<Value>(point, channels_, counters.lookups);
         return radiance;
       }
@@ -143,21 +144,27 @@ class PathKernel final : public RadianceKernel {
   /// Whether a collision is a scattering; weighs the throughput accordingly.  Where nothing emits it always is, for absorption
   /// adds nothing; otherwise one of the two is drawn, on chromatic media with the albedo averaged over what each channel carries,
   /// so that the mean of |throughput| over the channels stays what it was [Kutz et al. 2017, Sec. 5].
-  bool scatters(EventKind kind, Value& throughput, Rng& rng) const {
+  bool scatters(EventKind kind, const Vec3& point, Value& throughput, Rng& rng) const {
     if (kind != EventKind::collision) return kind == EventKind::scatter;
     if constexpr (!kEffects.scattering) return false;
+    if (scene_.albedo_field) [[unlikely]]
+      return scatters_by(albedo_at<Value>(*scene_.albedo_field, point, channels_), throughput, rng);
+    return scatters_by(albedo_, throughput, rng);
+  }
+
+  bool scatters_by(const Value& albedo, Value& throughput, Rng& rng) const {
     if constexpr (!kEffects.emission) {
-      throughput *= albedo_;
+      throughput *= albedo;
       return true;
     } else if constexpr (std::is_same_v<Value, Real>) {
-      return rng.uniform() < albedo_;
+      return rng.uniform() < albedo;
     } else {
       const Real whole = throughput.abs().sum();
       if (whole == 0) return true;
-      const Real scattered = (throughput.abs() * albedo_).sum(), absorbed = (throughput.abs() * (1 - albedo_)).sum();
+      const Real scattered = (throughput.abs() * albedo).sum(), absorbed = (throughput.abs() * (1 - albedo)).sum();
       const Real both = scattered + absorbed;
       const bool chosen = rng.uniform() * both < scattered;
-      throughput *= chosen ? Value(albedo_ * (both / scattered)) : Value((1 - albedo_) * (both / absorbed));
+      throughput *= chosen ? Value(albedo * (both / scattered)) : Value((1 - albedo) * (both / absorbed));
       return chosen;
     }
   }

@@ -32,7 +32,7 @@ void prepare_ray(RayData& ray, const Medium& medium, const Extrema& extrema, con
       ray.shares.push_back(bounds / bounds.sum());
     }
   }
-  ray.albedo = ray.value(0);
+  ray.set_albedo(ray.value(0), nullptr, world);
   ray.throughput = ray.value(1);
 }
 

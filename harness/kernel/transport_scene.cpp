@@ -45,7 +45,8 @@ Effects effects_of(const TransportScene& scene) {
   const bool vacuum = !(extrema.maximum.maxCoeff() > 0);
   Effects effects;
   effects.scattering = !vacuum && scene.albedo.size() > 0 && scene.albedo.maxCoeff() > 0;
-  effects.absorption = !vacuum && (scene.albedo.size() == 0 || scene.albedo.minCoeff() < 1);
+  effects.absorption = !vacuum && (scene.albedo.size() == 0 || scene.albedo.minCoeff() < 1 ||
+                                   (scene.albedo_field && scene.albedo_field->least(scene.medium->channels()).minCoeff() < 1));
   effects.emission = effects.absorption && scene.emission.any();
   effects.anisotropic = effects.scattering && scene.mean_cosine != 0;
   effects.chromatic = scene.medium->channels() > 1;

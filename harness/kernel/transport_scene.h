@@ -35,10 +35,11 @@ struct PathOptions {
 struct TransportScene {
   std::shared_ptr<const Medium> medium;
   std::shared_ptr<const MajorantStructure> majorant;
-  Spectrum albedo;          ///< mu_s / mu per channel, in [0, 1]; empty: 0
-  Real mean_cosine = 0;     ///< Henyey-Greenstein's g in (-1, 1); 0: isotropic
-  Emission emission;        ///< of the medium
-  Environment environment;  ///< behind everything
+  Spectrum albedo;                                  ///< mu_s / mu per channel, in [0, 1], its most where it varies; empty: 0
+  std::shared_ptr<const AlbedoField> albedo_field;  ///< where it varies in space
+  Real mean_cosine = 0;                             ///< Henyey-Greenstein's g in (-1, 1); 0: isotropic
+  Emission emission;                                ///< of the medium
+  Environment environment;                          ///< behind everything
   std::vector<Surface> surfaces;
   PathOptions options;
   Walkers towards_environment;  ///< estimate the transmittance of next events; empty: the sampler of the paths does

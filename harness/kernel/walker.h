@@ -20,7 +20,8 @@ struct PathScene {
   const Extrema* extrema = nullptr;  ///< over the whole medium
   const MajorantStructure* majorant = nullptr;
   int channels = 1;
-  Value albedo;
+  Value albedo;  ///< its most where it varies
+  const AlbedoField* albedo_field = nullptr;
   bool draws_absorption = true;
 };
 
@@ -140,7 +141,7 @@ class EstimatorWalker final : public Walker<Value> {
     ray.knots.clear();
     if (needs_knots()) sorted_knots(*path_scene.medium, local, ray.knots);
     prepare_ray<Traits>(ray, *path_scene.medium, *path_scene.extrema, world, state.local, path_scene.channels);
-    ray.albedo = path_scene.albedo;
+    ray.set_albedo(path_scene.albedo, path_scene.albedo_field, world);
     ray.draws_absorption = path_scene.draws_absorption;
     if constexpr (Traits::kPrepare) estimator_.prepare(ray);
   }

@@ -34,6 +34,7 @@ struct MediumSpec {
   std::vector<Real> spectrum;  ///< empty: grey
   std::vector<MediumSpec> per_channel;
   std::vector<Real> albedo;                ///< mu_s / mu, one for all channels or one each; empty: nothing scatters
+  std::vector<MediumSpec> albedo_field;    ///< at most one: its extinction is the albedo, in space
   Real anisotropy = 0;                     ///< mean cosine of the Henyey-Greenstein phase function, in (-1, 1)
   std::vector<Real> emission;              ///< radiance, one for all channels or one each; empty: nothing is emitted
   std::vector<MediumSpec> emission_field;  ///< at most one, grey: scales the emission in space
@@ -42,7 +43,8 @@ struct MediumSpec {
 
   bool operator==(const MediumSpec& other) const {
     return field == other.field && spectrum == other.spectrum && per_channel == other.per_channel && albedo == other.albedo &&
-           anisotropy == other.anisotropy && emission == other.emission && emission_field == other.emission_field;
+           albedo_field == other.albedo_field && anisotropy == other.anisotropy && emission == other.emission &&
+           emission_field == other.emission_field;
   }
 };
 

@@ -177,7 +177,7 @@ std::string compare_text(const std::vector<RunRecord>& runs, const std::string& 
 }
 
 std::string compare_markdown(const std::vector<RunRecord>& runs, const std::string& baseline, bool paired) {
-  std::string text;
+  std::string text = "### nullmark compare\n\n";
   for (const Comparison& comparison : comparisons(runs, baseline)) {
     text += fmt::format("**{}**\n\n{}\n", markdown_cell(comparison.name), markdown_table(ranking(comparison)));
     // A line that begins with a star would be a list.

@@ -197,6 +197,13 @@ const std::vector<std::string>& export_formats() {
   return kFormats;
 }
 
+std::string export_beginning(const std::string& format) {
+  if (format == "google-benchmark") return "{\n  \"context\": {";
+  if (format == "csv") return "id,name,experiment,";
+  if (format == "jsonl") return "{\"id\":\"";
+  return kJunitBeginning;
+}
+
 std::string export_results(const RunRecord& run, const std::string& format, const std::string& file) {
   if (format == "google-benchmark") return google_benchmark(run, file);
   if (format == "csv") return csv(run);

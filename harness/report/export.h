@@ -10,6 +10,9 @@ namespace nullmark {
 /// "google-benchmark", "csv", "jsonl", "junit".
 const std::vector<std::string>& export_formats();
 
+/// What exports in a format begin with.
+std::string export_beginning(const std::string& format);
+
 /// Results in the format of another program; `file` is the path of the results, for messages and reproduction commands.
 ///
 ///   google-benchmark  one row per timed repetition, names estimator/medium/param:value; for compare.py

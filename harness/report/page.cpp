@@ -45,6 +45,11 @@ std::string html(std::string_view text) {
 
 }  // namespace
 
+std::string page_beginning() {
+  const std::string_view page = NULLMARK_ASSET_TEXT(page);
+  return std::string(page.substr(0, page.find("{{")));
+}
+
 std::string report_page(const Json& data) {
   const std::map<std::string_view, std::string> parts = {
       {"title", html(data.value("title", "nullmark"))},

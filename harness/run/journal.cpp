@@ -10,6 +10,7 @@
 #include <cstring>
 #include <utility>
 
+#include "harness/io/consistency.h"
 #include "harness/io/file_io.h"
 #include "harness/io/notice.h"
 #include "harness/io/results_json.h"
@@ -57,6 +58,8 @@ void Journal::lock() {
     file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_APPEND | O_NOFOLLOW | O_NONBLOCK, 0666);
     if (file_ < 0 && errno == ELOOP)
       throw InputError(path_ + ": is a link, and a journal is a file; remove it or give another -o");
+    if (file_ < 0 && errno == EISDIR)
+      throw InputError(path_ + ": is a folder, and a journal is a file; remove it or give another -o");
     if (file_ < 0)
       throw InputError(
           fmt::format("{}: cannot be written: {}; give -o a path in an existing, writable folder", path_, std::strerror(errno)));
@@ -101,6 +104,7 @@ void Journal::read(const std::string& config_hash, Mode mode) {
     Json head;
     try {
       head = parse_json(line, where);
+      JsonNode(head, where)[kHead].integer(0, 1'000'000);
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}; the journal is damaged: --force starts again", error.what()));
     }
@@ -132,7 +136,9 @@ void Journal::read_line(const std::string& line, const std::string& where, const
   CellRecord record;
   try {
     json = parse_json(line, where);
-    if (!json.contains(kHead)) record = read_cell(JsonNode(json, where));
+    const JsonNode node(json, where);
+    if (!json.contains(kHead)) record = read_cell(node);
+    if (!json.contains(kHead)) expect_consistent(record, node);
   } catch (const InputError& error) {
     // What another program wrote there costs the cell of that line, not the others.
     notice("nullmark: warning: {}; the line is skipped\n", error.what());
@@ -160,8 +166,7 @@ void Journal::write_head(const std::string& config_hash) {
 
 /// Refuses a file that no run has left: opening a journal may empty it.
 void Journal::expect_own(const std::string& text, const std::string& config_hash) const {
-  constexpr std::size_t kBeginning = 8;
-  const std::size_t told = std::min(kBeginning, text.size());
+  const std::size_t told = std::min(std::strlen(kHead) + std::strlen("{\"\":"), text.size());
   const std::string_view beginning = std::string_view(text).substr(0, told);
   // After a power cut, unsynced bytes may read as zeros.
   if (beginning != head(config_hash).substr(0, told) && beginning.find('\0') == std::string_view::npos)

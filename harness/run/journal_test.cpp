@@ -66,7 +66,8 @@ TEST_F(JournalTest, IsAFileOfItsOwn) {
 }
 
 TEST_F(JournalTest, LeavesAnotherFileOfItsNameAlone) {
-  for (const char* text : {"precious notes", "precious\nnotes\n", "{\"mine\":1}"})
+  for (const char* text :
+       {"precious notes", "precious\nnotes\n", "{\"mine\":1}", "{\"nullmark\":\"config/2\",\"experiments\":[]}\n"})
     for (const Journal::Mode mode : {Journal::Mode::fresh, Journal::Mode::resume, Journal::Mode::overwrite}) {
       std::ofstream(path_, std::ios::trunc) << text;
       EXPECT_NE(open_error("hash", mode).find(path_ + ": is not the journal of a run"), std::string::npos) << text;
@@ -108,6 +109,16 @@ TEST_F(JournalTest, SkipsALineThatIsNoCellWithAWarning) {
     EXPECT_NE(warning.find("warning: " + path_ + line), std::string::npos) << warning;
     EXPECT_EQ(std::count(warning.begin(), warning.end(), '\n'), 1) << warning;
   }
+}
+
+/// Figures that contradict each other would make the results unreadable.
+TEST_F(JournalTest, SkipsACellThatDoesNotFitItself) {
+  CellRecord edited = cells_[0];
+  *edited.channel[0].mean += 1;
+  leave({edited, cells_[1]});
+  const Journal journal(results_, "hash", Journal::Mode::resume);
+  ASSERT_EQ(journal.cells().size(), 1u);
+  EXPECT_EQ(journal.cells()[0].cell.id, cells_[1].cell.id);
 }
 
 TEST_F(JournalTest, RefusesADamagedHead) {

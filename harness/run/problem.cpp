@@ -193,6 +193,7 @@ class ProblemWriter {
     MediumSpec spec = original(scene);
     spec.emission.clear();
     spec.emission_field.clear();
+    spec.albedo_field.clear();
     spec.optional = false;
     if (const std::size_t first = first_of(scene); first < scene) {
       problem_.media.push_back(problem_.media[first]);
@@ -214,6 +215,8 @@ class ProblemWriter {
     MediumSpec grey = original(scene);
     grey.spectrum.clear();
     grey.albedo.clear();
+    grey.albedo_field.clear();
+    for (MediumSpec& part : grey.per_channel) part.albedo.clear();
     const std::string name = grey.field.pointer;
     try {
       const BuiltMedium built = build_medium(grey);

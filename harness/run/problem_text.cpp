@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "harness/io/text.h"
+
 namespace nullmark {
 
 std::string problem_readme(const std::string& name, bool answers) {
@@ -70,7 +72,7 @@ nullmark judge . renders/ --scene 0 --range unit
 
 Exit codes: 0 PASS, 3 FAIL, 77 undecided, 2 a file that cannot be used.
 )",
-      name, answers ? "| `answers/ID.npy` | 64-bit floats, shape (rays, channels): the exact values |\n" : "");
+      markdown_cell(name), answers ? "| `answers/ID.npy` | 64-bit floats, shape (rays, channels): the exact values |\n" : "");
 }
 
 }  // namespace nullmark

@@ -40,6 +40,7 @@ TransportScene make_transport_scene(const MediumSpec& medium, const BuiltMedium&
   scene.medium = built.medium;
   scene.majorant = std::move(majorant);
   scene.albedo = built.albedo;
+  scene.albedo_field = built.albedo_field;
   scene.mean_cosine = medium.anisotropy;
   scene.emission.radiance = radiance(medium.emission, "emission");
   if (!medium.emission_field.empty()) scene.emission.field = build_medium(medium.emission_field[0]).medium;

@@ -128,6 +128,9 @@ std::string CellPreparer::why_not(const Cell& cell, const Scene& scene, const Ke
   if (!kernel.answers(cell.quantity))
     return fmt::format("{} does not answer {}{}", cell.estimator.type, to_string(cell.quantity),
                        cell.precision == Precision::float32 ? " in float" : "");
+  if (scene.medium->albedo_field && cell.quantity == Quantity::free_path &&
+      Registry<EstimatorEntry>::instance().find(cell.estimator.type)->foreign)
+    return "trackers from outside are told one albedo for a ray, and the medium's varies";
   const bool single = cell.precision == Precision::float32;
   const Box box = scene.medium->medium->bounds();
   const Real farthest = single ? kFarthestSingle : kFarthestDouble;
@@ -261,6 +264,13 @@ void refuse_endless(PreparedCell& prepared) {
         "a sample is expected to take {:.3g} lookups; at most {:.3g} are allowed: the depth of the majorant "
         "is that large; give a thinner medium or a tighter majorant",
         prepared.theory.most_lookups, most);
+  // Where theory cannot resolve so steep an extinction it states no lookups.
+  constexpr Real kDeepest = 0x1p40;
+  if (!prepared.theory.lookups && prepared.theory.majorant_depth > kDeepest)
+    prepared.reason = fmt::format(
+        "how many lookups a sample takes is not known, and the majorant's depth is {:.3g}; expected at most 2^40: give a thinner "
+        "medium or a tighter majorant",
+        prepared.theory.majorant_depth);
 }
 
 }  // namespace

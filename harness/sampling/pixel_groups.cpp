@@ -45,7 +45,7 @@ class PictureEstimator final : public EstimatorSource {
   SampleRange range(int) const override { return source_.range; }
   bool needs_bound() const override { return false; }
   std::optional<Real> order(Quantity) const override { return std::nullopt; }
-  void check(const Extrema&) const override {}
+  void check(const MatterBounds&) const override {}
   std::unique_ptr<const Kernel> kernel(int, Precision, bool) const override { return nullptr; }
   std::optional<TrackerIdentity> identity() const override {
     return TrackerIdentity{source_.name, "", source_.hash, true, false};

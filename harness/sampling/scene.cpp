@@ -10,6 +10,7 @@
 
 #include "harness/model/hash.h"
 #include "harness/registry/components.h"
+#include "media/base/albedo.h"
 #include "media/base/channels.h"
 #include "media/base/sum.h"
 
@@ -85,12 +86,43 @@ Spectrum per_channel(const std::vector<Real>& values, int channels, const char* 
   return result;
 }
 
+namespace {
+
+/// Of the whole, of the components of a sum, or a field.
+void add_albedo(BuiltMedium& built, const MediumSpec& spec) {
+  const int channels = built.medium->channels();
+  const auto scatters = [](const MediumSpec& part) { return !part.albedo.empty(); };
+  if (!spec.albedo_field.empty()) {
+    built.albedo_field = std::make_shared<FieldAlbedo>(build_medium(spec.albedo_field[0]).medium, channels);
+  } else if (std::any_of(spec.per_channel.begin(), spec.per_channel.end(), scatters)) {
+    Spectrum albedos = Spectrum::Zero(static_cast<Eigen::Index>(spec.per_channel.size()));
+    for (Eigen::Index i = 0; i < albedos.size(); ++i) {
+      const std::vector<Real>& own = spec.per_channel[static_cast<std::size_t>(i)].albedo;
+      if (!own.empty()) albedos[i] = own[0];
+    }
+    built.albedo_field = std::make_shared<SumAlbedo>(std::dynamic_pointer_cast<const Sum>(built.medium), albedos);
+  }
+  MatterBounds& bounds = built.extrema;
+  if (built.albedo_field) {
+    built.albedo = built.albedo_field->most(channels);
+    bounds.least_absorption = built.albedo_field->least_absorption(bounds.minimum);
+    bounds.least_scattering = built.albedo_field->least_scattering(bounds.minimum);
+    bounds.albedo_varies = true;
+  } else {
+    built.albedo = per_channel(spec.albedo, channels, "albedo");
+    bounds.least_absorption = (1 - built.albedo) * bounds.minimum;
+    bounds.least_scattering = built.albedo * bounds.minimum;
+  }
+}
+
+}  // namespace
+
 BuiltMedium build_medium(const MediumSpec& spec) {
   BuiltMedium built;
   built.medium = build_field(spec);
   const Box box = built.medium->bounds();
   built.extrema = built.medium->extrema(box);
-  built.albedo = per_channel(spec.albedo, built.medium->channels(), "albedo");
+  add_albedo(built, spec);
   const Affine to_world = built.medium->world_to_local().inverse();
   built.world_bounds = {Vec3::Constant(kInfinity), Vec3::Constant(-kInfinity)};
   for (int corner = 0; corner < 8; ++corner) {
@@ -99,8 +131,12 @@ BuiltMedium build_medium(const MediumSpec& spec) {
     built.world_bounds.lo = built.world_bounds.lo.cwiseMin(to_world * p);
     built.world_bounds.hi = built.world_bounds.hi.cwiseMax(to_world * p);
   }
-  const std::uint64_t content = built.medium->content_hash();
-  built.hash = fnv1a({reinterpret_cast<const char*>(&content), sizeof content}, fnv1a(spec.label));
+  const auto add_content = [&](std::uint64_t content) {
+    built.hash = fnv1a({reinterpret_cast<const char*>(&content), sizeof content}, built.hash);
+  };
+  built.hash = fnv1a(spec.label);
+  add_content(built.medium->content_hash());
+  if (built.albedo_field) add_content(built.albedo_field->content_hash());
   return built;
 }
 
@@ -230,6 +266,7 @@ void Scene::context(std::size_t ray, const Kernel& kernel, PreparedRay& out) con
   out.local = rays->local[ray];
   out.index = static_cast<std::uint32_t>(ray);
   out.albedo = medium->albedo;
+  out.albedo_field = medium->albedo_field.get();
   out.bounds.start(*majorant->structure, out.world, out.local);
   out.marks = {};
   if (marks) out.marks = {&marks->distance[ray * marks->per_ray], marks->per_ray};

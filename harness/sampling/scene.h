@@ -14,8 +14,9 @@ namespace nullmark {
 /// A built medium, with its extrema and the hash that keys its random streams.
 struct BuiltMedium {
   std::shared_ptr<const Medium> medium;
-  Extrema extrema;
-  Spectrum albedo;  ///< mu_s / mu per channel
+  MatterBounds extrema;
+  Spectrum albedo;                                  ///< mu_s / mu per channel, its most where it varies
+  std::shared_ptr<const AlbedoField> albedo_field;  ///< where it varies in space
   Box world_bounds;
   std::uint64_t hash = 0;  ///< of the specification and of the data behind it
 };

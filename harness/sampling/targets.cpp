@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/sampling/theory.h"
+
 namespace nullmark {
 namespace {
 
@@ -63,7 +65,60 @@ void profile_targets(const MarkedTransmittance& marked, Real* mean, Real* error)
     }
 }
 
-void free_path_targets(const MarkedTransmittance& marked, const Spectrum& albedo, Real* mean, Real* error) {
+/// int mu_s T dt, and a bound on its error.
+struct Scattered {
+  Spectrum mean, error;
+};
+
+/// Where the albedo is constant it is a share of all collisions.
+Scattered scattered_evenly(const MarkedTransmittance& marked, const Spectrum& albedo) {
+  Scattered result{albedo, albedo};
+  const std::size_t last = marked.marks() - 1;
+  for (std::size_t c = 0; c < marked.channels(); ++c) {
+    const auto i = static_cast<Eigen::Index>(c);
+    result.mean[i] = albedo[i] * -std::expm1(-marked.depth(last, c));
+    result.error[i] = marked.error(last, c);
+  }
+  return result;
+}
+
+/// By quadrature between the knots of extinction and albedo and the marks, between which few collide.
+Spectrum scattered_by_panels(const Scene& scene, std::size_t ray, std::vector<Real> cuts) {
+  const Medium& medium = *scene.medium->medium;
+  const AlbedoField& field = *scene.medium->albedo_field;
+  const Ray &world = scene.rays->world[ray], &local = scene.rays->local[ray];
+  const int channels = medium.channels();
+  std::sort(cuts.begin(), cuts.end());
+  cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
+  const Real end = cuts.back(), none = 0;
+  const RayProfile profile(lookups_along(medium, local), channels, cuts, {&end, 1}, {&none, 1});
+  Spectrum mean = Spectrum::Zero(channels);
+  for (int c = 0; c < channels; ++c)
+    mean[c] = profile.integrate(c, [&](const RayProfile::Node& at) {
+      return albedo_at<Spectrum>(field, world.at(at.t), channels)[c] * at.extinction * std::exp(-at.depth);
+    });
+  return mean;
+}
+
+/// The quadrature is repeated with panels of half the size: the difference bounds the error of the better one.
+Scattered scattered_along(const Scene& scene, std::size_t ray) {
+  const Ray &world = scene.rays->world[ray], &local = scene.rays->local[ray];
+  const Marks& marks = *scene.marks;
+  std::vector<Real> cuts, found;
+  sorted_knots(*scene.medium->medium, local, cuts);
+  scene.medium->albedo_field->knots(world, found);
+  found.insert(found.end(), &marks.distance[ray * marks.per_ray], &marks.distance[ray * marks.per_ray] + marks.per_ray);
+  for (const Real t : found)
+    if (t > local.begin && t < local.end) cuts.push_back(t);
+  std::sort(cuts.begin(), cuts.end());
+  const Spectrum coarse = scattered_by_panels(scene, ray, cuts);
+  for (std::size_t i = cuts.size() - 1; i > 0; --i) cuts.push_back((cuts[i - 1] + cuts[i]) / 2);
+  const Spectrum fine = scattered_by_panels(scene, ray, std::move(cuts));
+  constexpr Real kRounding = 1e-14;
+  return {fine, (fine - coarse).abs() + kRounding};
+}
+
+void free_path_targets(const MarkedTransmittance& marked, const std::optional<Scattered>& scattered, Real* mean, Real* error) {
   const std::size_t last = marked.marks() - 1, width = last / kFreePathBins;
   for (std::size_t c = 0; c < marked.channels(); ++c) {
     std::size_t output = c;
@@ -76,7 +131,7 @@ void free_path_targets(const MarkedTransmittance& marked, const Spectrum& albedo
       const std::size_t from = bin * width, to = from + width;
       put(marked.transmittance(from, c) - marked.transmittance(to, c), marked.error(from, c) + marked.error(to, c));
     }
-    if (scatters(albedo)) put(albedo[static_cast<Eigen::Index>(c)] * -std::expm1(-marked.depth(last, c)), marked.error(last, c));
+    if (scattered) put(scattered->mean[static_cast<Eigen::Index>(c)], scattered->error[static_cast<Eigen::Index>(c)]);
     put(marked.transmittance(last, c), marked.error(last, c));
     put(1, 0);
   }
@@ -126,7 +181,13 @@ Targets compute_targets(const Scene& scene, const Kernel& kernel, Quantity quant
         continue;
       }
       if (quantity == Quantity::free_path) {
-        free_path_targets(MarkedTransmittance(scene, ray), scene.medium->albedo, mean, error);
+        const MarkedTransmittance marked(scene, ray);
+        std::optional<Scattered> scattered;
+        if (scene.medium->albedo_field)
+          scattered = scattered_along(scene, ray);
+        else if (scatters(scene.medium->albedo))
+          scattered = scattered_evenly(marked, scene.medium->albedo);
+        free_path_targets(marked, scattered, mean, error);
         continue;
       }
       scene.context(ray, kernel, mine.context);

@@ -11,6 +11,17 @@
 
 namespace nullmark {
 
+RayProfile::Lookup lookups_along(const Medium& medium, const Ray& local) {
+  return [&medium, local](const Real* t, std::size_t n, Real* out) {
+    std::vector<Real> x(n), y(n), z(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec3 p = local.at(t[i]);
+      x[i] = p.x(), y[i] = p.y(), z[i] = p.z();
+    }
+    medium.extinction({x.data(), y.data(), z.data(), n}, out);
+  };
+}
+
 RayProfile make_profile(const Medium& medium, const Ray& local, const std::vector<Segment>& segments) {
   std::vector<Real> knots, ends, rates;
   sorted_knots(medium, local, knots);
@@ -18,16 +29,7 @@ RayProfile make_profile(const Medium& medium, const Ray& local, const std::vecto
     ends.push_back(segment.end);
     rates.push_back(segment.majorant);
   }
-  return RayProfile(
-      [&medium, local](const Real* t, std::size_t n, Real* out) {
-        std::vector<Real> x(n), y(n), z(n);
-        for (std::size_t i = 0; i < n; ++i) {
-          const Vec3 p = local.at(t[i]);
-          x[i] = p.x(), y[i] = p.y(), z[i] = p.z();
-        }
-        medium.extinction({x.data(), y.data(), z.data(), n}, out);
-      },
-      medium.channels(), knots, ends, rates);
+  return RayProfile(lookups_along(medium, local), medium.channels(), knots, ends, rates);
 }
 
 namespace {

@@ -33,6 +33,9 @@ struct TheoryQuery {
 };
 std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<TheoryQuery>& queries);
 
+/// The extinction at distances along a ray.
+RayProfile::Lookup lookups_along(const Medium& medium, const Ray& local);
+
 /// The extinction along a ray, cut at the medium's knots and the segments' ends.
 RayProfile make_profile(const Medium& medium, const Ray& local, const std::vector<Segment>& segments);
 

@@ -71,7 +71,7 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
       record.channel.push_back({next(), next(), next(), -next(), next(), next(), next(), next(), next(), next(), next(), next()});
     record.channel[0].kurtosis.reset();
     record.lookups_theory = 5e-324;
-    record.null_collisions_per_sample = 1.7976931348623157e308;
+    record.null_collisions_per_sample = 5e-324;
     record.lookups = 9007199254740993;
     record.draws = 9223372036854775807;
     record.lookups_per_sample = static_cast<Real>(record.lookups) / 10;

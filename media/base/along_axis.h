@@ -43,8 +43,7 @@ struct AlongAxis {
 
   int axis = 0;
   Real scale = 1, inverse_extent = 1;
-  bool fits_single = true;  ///< scale and profile, each for itself, are numbers of float
-  static constexpr Real kLeastSingle = 1e-30;
+  bool fits_single = true;  ///< float holds the numbers that the profile is computed by
 
   void parameters(ParameterVisitor& visit) {
     profile.parameters(visit);
@@ -69,8 +68,7 @@ struct AlongAxis {
                              "cannot rescale a profile whose integral is below 1e-280 or infinite; give optical_depth 0");
       scale = target_depth / whole;
     }
-    const auto fits = [](Real x) { return x == 0 || (x > kLeastSingle && x < 1 / kLeastSingle); };
-    fits_single = fits(scale) && fits(profile.extrema(0, 1).second);
+    fits_single = agrees_in_float();
   }
 
   Box bounds() const { return {lo, hi}; }
@@ -147,6 +145,24 @@ struct AlongAxis {
   }
 
  private:
+  /// Whether the profile as computed in float is that in double along the axis.  Where amplitude and bell, or scale and profile,
+  /// leave the range of float apart, their product may be infinite, none or not a number.
+  bool agrees_in_float() const {
+    if constexpr (requires(Lanes<float, 1> s) { profile.value(s); }) {
+      constexpr int kPoints = 64;
+      constexpr Real kRounding = 1e-2, kNothing = 1e-6;
+      const Real most = scale * profile.extrema(0, 1).second;
+      for (int i = 0; i <= kPoints; ++i) {
+        const auto s = static_cast<float>(i) / kPoints;
+        float single = 0;
+        (scale * profile.value(Lanes<float, 1>::load(&s))).store(&single);
+        const Real exact = scale * profile.value(Real{s});
+        if (!(std::abs(single - exact) <= kRounding * exact + kNothing * most)) return false;
+      }
+    }
+    return true;
+  }
+
   // A mean does depend on b - a where f jumps between them; lengths from knot to knot do not.
   Real sum_of_constant_pieces(const Ray& ray) const {
     Real sum = 0, from = ray.begin;

@@ -41,7 +41,10 @@ class Sum final : public Medium {
 
   int components() const override { return parts_.channels(); }
   Spectrum component_maxima(const Box& box) const override { return parts_.extrema(box).maximum; }
-  Real component_extinction(int component, const Vec3& point) const override { return parts_.channel_extinction(component, point); }
+  Spectrum component_minima(const Box& box) const { return parts_.extrema(box).minimum; }
+  Real component_extinction(int component, const Vec3& point) const override {
+    return parts_.channel_extinction(component, point);
+  }
 
  private:
   static constexpr std::size_t kBlock = 64;
