@@ -23,6 +23,7 @@ struct AnalogDecompositionTracking {
   static constexpr SampleRange kRange = SampleRange::binary;
   static constexpr bool kNeedsBound = true;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kGreyOnly = true;
 
   std::string control = "minimum";
   Real factor = 1, value = 0;
@@ -37,10 +38,6 @@ struct AnalogDecompositionTracking {
   }
 
   void check(const MatterBounds& medium) const {
-    if (medium.minimum.size() > 1)
-      throw ParameterError("type", std::string(kName) + " takes grey media only; expected one channel, found " +
-                                       std::to_string(medium.minimum.size()) +
-                                       "; \"spectral\" with control \"minimum\" decomposes chromatic media");
     if (control == "given" && value > medium.minimum[0])
       throw ParameterError("value", "control exceeds the medium's least extinction; " + std::string(kName) +
                                         " needs mu_c <= mu; \"weighted_decomposition\" takes any control");

@@ -16,6 +16,7 @@
 #include "estimators/sampler_test.h"
 #include "estimators/theory/kinks.h"
 #include "estimators/weighted_decomposition.h"
+#include "harness/kernel/estimator_template.h"
 #include "harness/testing/built_media.h"
 #include "harness/testing/hand_walked.h"
 
@@ -162,8 +163,8 @@ TEST(Decomposition, RefusesWhatItCannotBound) {
   EXPECT_NO_THROW(with_value(0.5).check(grey));
   EXPECT_THROW(with_value(0.51).check(grey), ParameterError);
   const Extrema three = {Spectrum::Ones(3), Spectrum::Ones(3), Spectrum::Ones(3)};
-  EXPECT_THROW(AnalogDecompositionTracking<Real>{}.check(three), ParameterError);
-  EXPECT_THROW(WeightedDecompositionTracking<Real>{}.check(three), ParameterError);
+  EXPECT_THROW(EstimatorTemplate<AnalogDecompositionTracking>().check(three), ParameterError);
+  EXPECT_THROW(EstimatorTemplate<WeightedDecompositionTracking>().check(three), ParameterError);
   EXPECT_THROW(with<WeightedDecompositionTracking>([](auto& e) { e.control = "given"; }).check(grey), ParameterError);
   EXPECT_THROW(with<WeightedDecompositionTracking>([](auto& e) { e.controls = {1}; }).check(grey), ParameterError);
 }

@@ -75,6 +75,8 @@ namespace nullmark {
 //       the fourth moment can be infinite although the variance is finite; no number of samples shows this
 //   static constexpr bool kHeavyLookups
 //       the number of lookups has infinite variance at the defaults, so its mean over samples does not settle
+//   static constexpr bool kGreyOnly
+//       takes media of one channel; no kernel of several is compiled
 //   static constexpr bool kOwnFlights
 //       draws its flights by its own law
 //   static constexpr bool kLanes = true

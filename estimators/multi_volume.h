@@ -15,17 +15,12 @@ struct MultiVolumeTracking : DeltaTracking<Value> {
   static constexpr const char* kSource = "Galtier et al. 2013; Kutz, Habel, Li, Novak 2017, Sec. 2";
   static constexpr bool kNeedsShares = true;
   static constexpr bool kLanes = false;
+  static constexpr bool kGreyOnly = true;
 
   using Base = DeltaTracking<Value>;
   using RayData = typename Base::RayData;
 
   void parameters(ParameterVisitor&) {}
-
-  void check(const MatterBounds& medium) const {
-    if (medium.minimum.size() > 1)
-      throw ParameterError("type", std::string(kName) + " takes grey media only; expected one channel, found " +
-                                       std::to_string(medium.minimum.size()) + "; \"spectral\" takes chromatic media");
-  }
 
   struct Walk : Base::Walk {
     int picked = 0;

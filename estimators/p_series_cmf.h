@@ -19,6 +19,8 @@ struct PowerSeriesCmf {
   static constexpr bool kOwnFlights = true;
 
   static constexpr Real kShare = 0.99;
+  /// Beyond it a walk takes more lookups than one may.
+  static constexpr Real kDeepest = 0x1p31;
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
@@ -28,6 +30,8 @@ struct PowerSeriesCmf {
   };
 
   void prepare(RayData& ray) const {
+    ray.always = 0;
+    if (!(ray.majorant.total_depth() < kDeepest)) return;
     ray.tail.set_up(ray.majorant.total_depth());
     ray.always = ray.majorant.total_depth() > 0 ? ray.tail.first_at_most(1 - kShare) : 0;
   }
@@ -55,6 +59,7 @@ struct PowerSeriesCmf {
   Value result(const Walk& walk, const RayData&) const { return walk.series.total(); }
 
   Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
+    if (!(ray.majorant.total_depth() < kDeepest)) return {.lookups = ray.majorant.total_depth()};
     const SeriesMoments moments = series_moments(ray, profile, c);
     const auto always = static_cast<Real>(ray.always);
     const auto log_growth = [&](std::int64_t n) {

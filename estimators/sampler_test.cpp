@@ -22,6 +22,7 @@
 #include "estimators/spectral.h"
 #include "estimators/weighted_decomposition.h"
 #include "estimators/weighted_delta.h"
+#include "harness/kernel/estimator_template.h"
 #include "harness/testing/built_media.h"
 #include "harness/testing/hand_walked.h"
 #include "media/base/channels.h"
@@ -161,7 +162,7 @@ TEST(Sampler, MultiVolumeLooksOneComponentUpAndKeepsTheLaw) {
   }
   EXPECT_EQ(*delta.theory().lookups, *HandWalked<MultiVolumeTracking>({}, sum, 1, 1.5, 4).theory().lookups);
   const Extrema two = {Spectrum::Ones(2), Spectrum::Ones(2), Spectrum::Ones(2)};
-  EXPECT_THROW(MultiVolumeTracking<Real>{}.check(two), ParameterError);
+  EXPECT_THROW(EstimatorTemplate<MultiVolumeTracking>().check(two), ParameterError);
 }
 
 /// The distance's error against exact inversion falls with the order of the march's depth.

@@ -26,6 +26,7 @@ struct WeightedDecompositionTracking {
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kGreyOnly = true;
 
   std::string control = "minimum";
   std::vector<Real> controls, control_albedo;
@@ -39,10 +40,6 @@ struct WeightedDecompositionTracking {
   }
 
   void check(const MatterBounds& medium) const {
-    if (medium.minimum.size() > 1)
-      throw ParameterError("type", std::string(kName) + " takes grey media only; expected one channel, found " +
-                                       std::to_string(medium.minimum.size()) +
-                                       "; \"spectral\" with control \"minimum\" decomposes chromatic media");
     if ((control == "given") == controls.empty())
       throw ParameterError("controls", "control \"given\" takes its extinctions from controls, the others take none");
     expect_control_albedo(medium, control_albedo);

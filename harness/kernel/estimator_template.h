@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <type_traits>
 
 #include "harness/kernel/block_kernel.h"
@@ -12,7 +13,16 @@ namespace nullmark {
 template <template <class> class Estimator>
 class EstimatorTemplate final : public EstimatorSource {
   using Traits = EstimatorTraits<Estimator<Real>, Real>;
-  static_assert(expect_estimator<Estimator<Real>, Real>() && expect_estimator<Estimator<Spectrum>, Spectrum>());
+  static constexpr bool kGreyOnly = requires { Estimator<Real>::kGreyOnly; };
+  struct None {};
+  using Chromatic = std::conditional_t<kGreyOnly, None, Estimator<Spectrum>>;
+  static_assert(expect_estimator<Estimator<Real>, Real>());
+  static_assert([] {
+    if constexpr (kGreyOnly)
+      return true;
+    else
+      return expect_estimator<Estimator<Spectrum>, Spectrum>();
+  }());
 
  public:
   void parameters(ParameterVisitor& visit) override {
@@ -28,13 +38,20 @@ class EstimatorTemplate final : public EstimatorSource {
     }
   }
   Guarantee claim(Quantity quantity) const override { return grey_.claim(quantity); }
-  SampleRange range(int channels) const override { return channels == 1 ? range_of(grey_) : range_of(chromatic_); }
+  SampleRange range(int channels) const override {
+    if constexpr (!kGreyOnly)
+      if (channels > 1) return range_of(chromatic_);
+    return range_of(grey_);
+  }
   bool needs_bound() const override { return Estimator<Real>::kNeedsBound; }
   std::optional<Real> order(Quantity quantity) const override {
     if constexpr (Traits::kOrder) return grey_.order(quantity);
     return std::nullopt;
   }
   void check(const MatterBounds& medium) const override {
+    if (kGreyOnly && medium.minimum.size() > 1)
+      throw ParameterError("type", std::string(Estimator<Real>::kName) + " takes grey media only; expected one channel, found " +
+                                       std::to_string(medium.minimum.size()) + "; \"spectral\" takes chromatic media");
     if constexpr (Traits::kCheck) grey_.check(medium);
   }
   std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64, bool lanes = true) const override {
@@ -50,11 +67,15 @@ class EstimatorTemplate final : public EstimatorSource {
       if (channels == 3) return std::make_unique<BlockKernel<Estimator, SpectrumOf<3>>>(three_, channels);
       if (channels == 4) return std::make_unique<BlockKernel<Estimator, SpectrumOf<4>>>(four_, channels);
     }
-    return std::make_unique<BlockKernel<Estimator, Spectrum>>(chromatic_, channels);
+    if constexpr (kGreyOnly)
+      return nullptr;
+    else
+      return std::make_unique<BlockKernel<Estimator, Spectrum>>(chromatic_, channels);
   }
   Walkers walkers() const override {
-    return {std::make_shared<EstimatorWalker<Estimator, Real>>(grey_),
-            std::make_shared<EstimatorWalker<Estimator, Spectrum>>(chromatic_)};
+    Walkers walkers{std::make_shared<EstimatorWalker<Estimator, Real>>(grey_), nullptr};
+    if constexpr (!kGreyOnly) walkers.chromatic = std::make_shared<EstimatorWalker<Estimator, Spectrum>>(chromatic_);
+    return walkers;
   }
 
  private:
@@ -72,13 +93,12 @@ class EstimatorTemplate final : public EstimatorSource {
   /// Trackers derived from one that runs in lanes may not.
   static constexpr bool kInLanes = runs_in_lanes<Estimator>();
   /// Widths known to the compiler take half the time, and each adds a second to a tracker's compilation: not for planted bugs.
-  static constexpr bool kOfFixedWidth = !requires { Estimator<Real>::kCaughtBy; };
-  struct None {};
+  static constexpr bool kOfFixedWidth = !kGreyOnly && !requires { Estimator<Real>::kCaughtBy; };
 
   Estimator<Real> grey_;
   [[no_unique_address]] std::conditional_t<kOfFixedWidth, Estimator<SpectrumOf<3>>, None> three_;
   [[no_unique_address]] std::conditional_t<kOfFixedWidth, Estimator<SpectrumOf<4>>, None> four_;
-  Estimator<Spectrum> chromatic_;
+  [[no_unique_address]] Chromatic chromatic_;
   [[no_unique_address]] std::conditional_t<kInLanes, LanesOf<Estimator, Real>, None> lanes_;
   [[no_unique_address]] std::conditional_t<kInLanes, LanesOf<Estimator, float>, None> single_;
 };

@@ -14,4 +14,6 @@ def ratio_in_numpy(ray, samples):
 
 
 if __name__ == "__main__":
-    print(nullmark.judge(ratio_in_numpy, "ratio", media=["cosine", "linear"]))
+    verdict = nullmark.judge(ratio_in_numpy, "ratio", media=["cosine", "linear"])
+    print(verdict)
+    raise SystemExit(verdict.exit_code)

@@ -107,7 +107,7 @@ class Verdict:
 
     def __init__(self, path):
         self.path = str(path)
-        checked = _run("check", self.path, accept=(0, 1, 3, 5, 77))
+        checked = _run("check", self.path, "--all", accept=(0, 1, 3, 5, 77))
         self.text, self.exit_code = checked.stdout, checked.returncode
         self.records = _records(path)
 
@@ -150,6 +150,8 @@ def _medium(medium):
 
 def estimator(tracker):
     """A tracker as an object of a configuration; names and objects pass."""
+    if callable(tracker) and not isinstance(tracker, Tracker):
+        raise NullmarkError(f"{getattr(tracker, '__name__', tracker)} is no tracker; decorate it with @nullmark.tracker")
     if not isinstance(tracker, Tracker):
         return tracker
     try:
