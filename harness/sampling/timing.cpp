@@ -11,12 +11,13 @@
 #include "harness/model/in_flight.h"
 #include "harness/model/names.h"
 #include "harness/sampling/reference_loops.h"
+#include "harness/statistics/median.h"
 #include "media/volumes/volume.h"
 
 namespace nullmark {
 namespace {
 
-using boost::math::statistics::median, boost::math::statistics::median_absolute_deviation;
+using boost::math::statistics::median;
 
 constexpr std::size_t kRays = 64;  ///< at most this many, spread evenly over the cell's
 
@@ -100,7 +101,8 @@ std::vector<Real> sample_times(const std::vector<Repetition>& repetitions) {
 }
 
 BatchTime batch_time(std::uint64_t samples_per_traversal, std::vector<Real> ns) {
-  return {samples_per_traversal, median(ns), median_absolute_deviation(ns)};
+  const MedianSpread spread = median_spread(std::move(ns));
+  return {samples_per_traversal, spread.median, spread.deviation};
 }
 
 /// Leaves Google Benchmark altogether: 1.7 aborts when a benchmark is skipped in one of several interleaved repetitions.
