@@ -40,7 +40,7 @@ class Comparison {
     const ChannelRecord& channel = record_.channel[c];
     if (channel.mean && channel.reference && channel.bias)
       expect("bias", channel.bias, *channel.mean - *channel.reference, "the mean less the reference",
-             std::abs(*channel.mean) + std::abs(*channel.reference));
+             kDigits * (std::abs(*channel.mean) + std::abs(*channel.reference)));
     // The square of a smaller error is none.
     constexpr Real kLeast = 1e-150;
     if (channel.rmse && channel.bias && *channel.rmse < std::abs(*channel.bias) * (1 - kRounding) - kLeast)
@@ -55,16 +55,18 @@ class Comparison {
   }
 
  private:
-  /// Figures that determine each other were summed in another order.
-  static constexpr Real kRounding = 1e-6;
+  /// Figures that determine each other were summed in another order; a difference was computed before its terms became text.
+  static constexpr Real kRounding = 1e-6, kDigits = 1e-9;
 
   [[noreturn]] void fail(const char* key, const std::string& found) const {
     cell_[key].fail(fmt::format("found {}; the file was changed, or is damaged: make the results again", found));
   }
 
-  void expect(const char* key, const std::optional<Real>& figure, Real wanted, const char* meaning, Real scale = 0) const {
-    if (!figure || !std::isfinite(wanted)) return;
-    if (std::abs(*figure - wanted) <= kRounding * (scale > 0 ? scale : std::abs(wanted))) return;
+  void expect(const char* key, const std::optional<Real>& figure, Real wanted, const char* meaning) const {
+    expect(key, figure, wanted, meaning, kRounding * std::abs(wanted));
+  }
+  void expect(const char* key, const std::optional<Real>& figure, Real wanted, const char* meaning, Real allowed) const {
+    if (!figure || !std::isfinite(wanted) || std::abs(*figure - wanted) <= allowed) return;
     fail(key, fmt::format("{} {:.9g}, and {:.9g} as {}", key, *figure, wanted, meaning));
   }
 
@@ -88,13 +90,13 @@ class Comparison {
     };
     const std::uint64_t each = record_.cell.samples_per_ray;
     const std::optional<Real> single = figure(record_.convergence.front().rmse), all = figure(record_.convergence.back().rmse);
-    if (record_.convergence.back().samples == each && all)
-      expect("rmse", channel.rmse, *all, "the last of convergence", std::abs(*all));
+    if (record_.convergence.back().samples == each && all) expect("rmse", channel.rmse, *all, "the last of convergence");
     if (!single || !channel.rmse || record_.convergence.front().samples != 1) return;
     const auto n = static_cast<Real>(each);
     // The mean square of single errors is the samples' variance about the ray's mean, and the square of that mean's error.
     const Real within = *single * *single - *channel.rmse * *channel.rmse;
-    if (each > 1) expect("variance", channel.variance, within * n / (n - 1), "convergence and rmse tell", *single * *single);
+    if (each > 1)
+      expect("variance", channel.variance, within * n / (n - 1), "convergence and rmse tell", kRounding * *single * *single);
   }
 
   const CellRecord& record_;

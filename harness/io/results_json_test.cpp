@@ -163,6 +163,8 @@ TEST(ResultsJson, EditedFilesDoNotFitThemselves) {
             0u);
   EXPECT_EQ(error_with([](CellRecord& cell) { *cell.channel[0].mean += 1e-3; }).rfind("r.json: /cells/0/bias: found bias ", 0),
             0u);
+  EXPECT_EQ(
+      error_with([](CellRecord& cell) { *cell.channel[0].mean *= 1 + 1e-7; }).rfind("r.json: /cells/0/bias: found bias ", 0), 0u);
   const auto place_of = [&](const auto& edit) {
     const std::string error = error_with(edit);
     return error.substr(0, error.find(": found "));
