@@ -8,9 +8,6 @@
 
 namespace nullmark {
 
-/// Cells of a configuration, at most.  Otherwise a few lists in a small file could fill memory.
-inline constexpr std::size_t kMostCells = 100'000;
-
 /// Throws InputError if a x b combinations are more.
 void expect_cells(const JsonNode& node, std::size_t a, std::size_t b);
 

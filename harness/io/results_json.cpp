@@ -70,10 +70,8 @@ RunRecord read_results(const std::string& text, const std::string& file) {
   if (top.has("config_hash") && !run.config_text.empty() && top["config_hash"].string() != config_hash(run.config_text))
     top["config_hash"].fail(
         "does not fit the configuration in the file; the file was changed, or is damaged: make the results again");
-  // As many as configurations may have.
-  constexpr std::size_t kMost = 100'000;
-  if (top["cells"].json().size() > kMost)
-    top["cells"].fail(fmt::format("found {} cells; expected at most {}", top["cells"].json().size(), kMost));
+  if (const std::size_t cells = top["cells"].json().size(); cells > kMostCells)
+    top["cells"].fail(fmt::format("found {} cells; expected at most {}", cells, kMostCells));
   std::set<std::string> seen;
   for (const JsonNode& cell : top["cells"].elements()) {
     run.cells.push_back(read_cell(cell));

@@ -13,7 +13,9 @@ namespace nullmark {
 template <template <class> class Estimator>
 class EstimatorTemplate final : public EstimatorSource {
   using Traits = EstimatorTraits<Estimator<Real>, Real>;
-  static constexpr bool kGreyOnly = requires { Estimator<Real>::kGreyOnly; };
+  static constexpr bool kPlanted = requires { Estimator<Real>::kCaughtBy; };
+  /// Planted bugs are tried in colour whatever they derive from.
+  static constexpr bool kGreyOnly = Traits::kGreyOnly && !kPlanted;
   struct None {};
   using Chromatic = std::conditional_t<kGreyOnly, None, Estimator<Spectrum>>;
   static_assert(expect_estimator<Estimator<Real>, Real>());
@@ -93,7 +95,7 @@ class EstimatorTemplate final : public EstimatorSource {
   /// Trackers derived from one that runs in lanes may not.
   static constexpr bool kInLanes = runs_in_lanes<Estimator>();
   /// Widths known to the compiler take half the time, and each adds a second to a tracker's compilation: not for planted bugs.
-  static constexpr bool kOfFixedWidth = !kGreyOnly && !requires { Estimator<Real>::kCaughtBy; };
+  static constexpr bool kOfFixedWidth = !kGreyOnly && !kPlanted;
 
   Estimator<Real> grey_;
   [[no_unique_address]] std::conditional_t<kOfFixedWidth, Estimator<SpectrumOf<3>>, None> three_;

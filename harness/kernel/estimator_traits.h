@@ -108,6 +108,7 @@ struct EstimatorTraits {
     { e.weight_theory(ray, profile, 0) } -> std::convertible_to<Theory>;
   };
 
+  static constexpr bool kGreyOnly = requires { E::kGreyOnly; };
   static constexpr bool kIgnoresMajorant = requires { E::kIgnoresMajorant; };
   static constexpr bool kOwnFlights = requires { E::kOwnFlights; };
   static constexpr bool kNeedsInversion = requires { E::kNeedsInversion; };

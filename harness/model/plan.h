@@ -13,6 +13,9 @@
 
 namespace nullmark {
 
+/// Cells of a configuration and of its results, at most.  Otherwise a few lists in a small file could fill memory.
+inline constexpr std::size_t kMostCells = 100'000;
+
 using ParameterValue =
     std::variant<Real, int, bool, std::string, std::vector<Real>, std::array<Real, 3>, std::vector<std::string>>;
 /// By parameter name; defaults are filled in.

@@ -33,6 +33,7 @@ std::vector<std::pair<const char*, bool>> optional_members() {
           {"component", Traits::kComponent},
           {"needs_optical_depth", Traits::kMayNeedOpticalDepth},
           {"kLanes", lanes},
+          {"kGreyOnly", Traits::kGreyOnly},
           {"kIgnoresMajorant", Traits::kIgnoresMajorant},
           {"kHeavySamples", samples},
           {"kHeavyLookups", lookups},

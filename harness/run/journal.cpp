@@ -137,8 +137,10 @@ void Journal::read_line(const std::string& line, const std::string& where, const
   try {
     json = parse_json(line, where);
     const JsonNode node(json, where);
-    if (!json.contains(kHead)) record = read_cell(node);
-    if (!json.contains(kHead)) expect_consistent(record, node);
+    if (!json.contains(kHead)) {
+      record = read_cell(node);
+      expect_consistent(record, node);
+    }
   } catch (const InputError& error) {
     // What another program wrote there costs the cell of that line, not the others.
     notice("nullmark: warning: {}; the line is skipped\n", error.what());

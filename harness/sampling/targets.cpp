@@ -83,13 +83,11 @@ Scattered scattered_evenly(const MarkedTransmittance& marked, const Spectrum& al
 }
 
 /// By quadrature between the knots of extinction and albedo and the marks, between which few collide.
-Spectrum scattered_by_panels(const Scene& scene, std::size_t ray, std::vector<Real> cuts) {
+Spectrum scattered_by_panels(const Scene& scene, std::size_t ray, const std::vector<Real>& cuts) {
   const Medium& medium = *scene.medium->medium;
   const AlbedoField& field = *scene.medium->albedo_field;
   const Ray &world = scene.rays->world[ray], &local = scene.rays->local[ray];
   const int channels = medium.channels();
-  std::sort(cuts.begin(), cuts.end());
-  cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
   const Real end = cuts.back(), none = 0;
   const RayProfile profile(lookups_along(medium, local), channels, cuts, {&end, 1}, {&none, 1});
   Spectrum mean = Spectrum::Zero(channels);
@@ -111,9 +109,10 @@ Scattered scattered_along(const Scene& scene, std::size_t ray) {
   for (const Real t : found)
     if (t > local.begin && t < local.end) cuts.push_back(t);
   std::sort(cuts.begin(), cuts.end());
-  const Spectrum coarse = scattered_by_panels(scene, ray, cuts);
-  for (std::size_t i = cuts.size() - 1; i > 0; --i) cuts.push_back((cuts[i - 1] + cuts[i]) / 2);
-  const Spectrum fine = scattered_by_panels(scene, ray, std::move(cuts));
+  cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
+  std::vector<Real> halved = {cuts[0]};
+  for (std::size_t i = 1; i < cuts.size(); ++i) halved.insert(halved.end(), {(cuts[i - 1] + cuts[i]) / 2, cuts[i]});
+  const Spectrum coarse = scattered_by_panels(scene, ray, cuts), fine = scattered_by_panels(scene, ray, halved);
   constexpr Real kRounding = 1e-14;
   return {fine, (fine - coarse).abs() + kRounding};
 }
