@@ -10,7 +10,7 @@
 namespace nullmark {
 namespace {
 
-const std::vector<std::string> kShapes = {"plane", "box", "sphere"}, kNextEvent = {"off", "phase", "uniform"},
+const std::vector<std::string> kShapes = {"plane", "box", "sphere"}, kNextEvent = {"off", "phase", "uniform", "mis"},
                                kKernels = {"own", "general"};
 
 /// Three numbers.

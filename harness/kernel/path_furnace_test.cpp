@@ -36,7 +36,7 @@ TEST(PathFurnace, EveryPathOfAGreyMediumBringsTheEnvironmentExactly) {
 TEST(PathFurnace, NextEventsAndRouletteKeepTheMean) {
   for (const auto& medium : {homogeneous(3), bump(8)})
     for (const Real g : {0., 0.8})
-      for (const NextEvent next : {NextEvent::off, NextEvent::phase, NextEvent::uniform})
+      for (const NextEvent next : {NextEvent::off, NextEvent::phase, NextEvent::uniform, NextEvent::mis})
         for (const bool general : {false, true}) {
           TransportScene scene = scene_of(medium, spectrum({1}));
           scene.environment.radiance = spectrum({1});
@@ -53,7 +53,7 @@ TEST(PathFurnace, ChromaticMediaKeepTheMeanOfEveryChannel) {
       std::make_shared<PerChannel>(std::vector<std::shared_ptr<const Medium>>{homogeneous(0.5), bump(3), bump(1)});
   for (const std::shared_ptr<const Medium>& medium :
        {times(homogeneous(1.5), {0.3, 1, 2}), times(bump(2), {1, 0.5, 2}), std::shared_ptr<const Medium>(channels)})
-    for (const NextEvent next : {NextEvent::off, NextEvent::phase, NextEvent::uniform})
+    for (const NextEvent next : {NextEvent::off, NextEvent::phase, NextEvent::uniform, NextEvent::mis})
       for (const bool general : {false, true}) {
         TransportScene scene = scene_of(medium, spectrum({1, 1, 1}));
         scene.environment.radiance = spectrum({1, 2, 3});
@@ -88,7 +88,7 @@ TEST(PathFurnace, EquilibriumIsKeptByEveryKernel) {
   for (const Case& one : cases)
     for (const Real g : {0., 0.6})
       for (const bool surfaces : {false, true})
-        for (const NextEvent next : {NextEvent::off, NextEvent::uniform})
+        for (const NextEvent next : {NextEvent::off, NextEvent::uniform, NextEvent::mis})
           for (const bool general : {false, true}) {
             TransportScene scene = scene_of(one.medium, one.albedo, true);
             scene.environment.radiance = scene.emission.radiance = one.radiance;

@@ -106,13 +106,14 @@ class PathKernel final : public RadianceKernel {
   Value path(State& state, Rng& rng, EventBudget& budget, Counters& counters) const {
     Value radiance = uniform(0), throughput = uniform(1);
     Leg* leg = &state.camera;
+    Real environment_weight = 1;  // of the environment that the leg's end sees
     for (int scatterings = 0;; ++scatterings) {
       Event<Value> event{EventKind::escape, 0, uniform(1)};
       if (leg->sight.world.length() > 0) event = walker_->fly(*leg->memory, state.path_scene, throughput, rng, budget, counters);
       if (!budget.spend()) return radiance;
       throughput *= event.weight;
       if (!is_collision(event.kind)) {
-        radiance += throughput * radiance_at_end(leg->sight, scatterings);
+        radiance += throughput * radiance_at_end(leg->sight, environment_weight);
         return radiance;
       }
       const Vec3 point = leg->sight.world.at(event.distance);
@@ -127,18 +128,27 @@ class PathKernel final : public RadianceKernel {
         if (scene_.options.next_event != NextEvent::off)
           radiance += throughput * from_environment(state, point, direction, rng, budget, counters);
       if (vanished(throughput) || !survives(scatterings + 1, throughput, rng)) return radiance;
-      begin_leg(state, state.onward, *walker_, {point, phase_.sample(direction, rng), 0, kInfinity});
+      const Vec3 onward = phase_.sample(direction, rng);
+      if constexpr (kEffects.next_event) environment_weight = weight_by_phase(direction, onward);
+      begin_leg(state, state.onward, *walker_, {point, onward, 0, kInfinity});
       leg = &state.onward;
     }
   }
 
-  /// Of the surface met or of the environment, unless next events have counted that already.
-  Value radiance_at_end(const Sight& sight, int scatterings) const {
+  /// Of the surface met or of the environment.
+  Value radiance_at_end(const Sight& sight, Real environment_weight) const {
     if constexpr (kEffects.surfaces)
       if (sight.hit.surface) return surfaces_[static_cast<std::size_t>(sight.hit.surface - scene_.surfaces.data())];
-    if constexpr (kEffects.next_event)
-      if (scatterings > 0 && scene_.options.next_event != NextEvent::off) return uniform(0);
+    if constexpr (kEffects.next_event) return environment_ * environment_weight;
     return environment_;
+  }
+
+  /// Share of the environment that is left to a path scattered by the phase function; next events count the rest.
+  Real weight_by_phase(const Vec3& from, const Vec3& to) const {
+    if (scene_.options.next_event == NextEvent::off) return 1;
+    if (scene_.options.next_event != NextEvent::mis) return 0;
+    const Real phase = phase_.value(from, to);
+    return phase / (phase + Isotropic().value(from, to));
   }
 
   /// Whether a collision is a scattering; weighs the throughput accordingly.  Where nothing emits it always is, for absorption
@@ -173,13 +183,14 @@ class PathKernel final : public RadianceKernel {
   Value from_environment(State& state, const Vec3& point, const Vec3& direction, Rng& rng, EventBudget& budget,
                          Counters& counters) const {
     Vec3 towards;
-    Real weight = 1;  // phase function over density of the direction
+    Real weight = 1;  // phase function over density of the direction, or over the sum of both densities
     if (scene_.options.next_event == NextEvent::phase) {
       towards = phase_.sample(direction, rng);
     } else {
       const Isotropic uniform_directions;
       towards = uniform_directions.sample(direction, rng);
-      weight = phase_.value(direction, towards) / uniform_directions.value(direction, towards);
+      const Real phase = phase_.value(direction, towards), density = uniform_directions.value(direction, towards);
+      weight = phase / (scene_.options.next_event == NextEvent::mis ? phase + density : density);
     }
     Leg& leg = state.shadow;
     begin_leg(state, leg, *shadow_walker_, {point, towards, 0, kInfinity});

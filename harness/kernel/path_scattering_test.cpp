@@ -48,7 +48,7 @@ TEST(PathScattering, SingleScatteringInASlabMeetsQuadrature) {
                                     [](Real z) { return -1.5 * std::expm1(-2 * z); }}};
   for (const Slab& slab : slabs)
     for (const Real g : {0., 0.6})
-      for (const NextEvent next : {NextEvent::off, NextEvent::phase, NextEvent::uniform})
+      for (const NextEvent next : {NextEvent::off, NextEvent::phase, NextEvent::uniform, NextEvent::mis})
         for (const bool general : {false, true}) {
           TransportScene scene = scene_of(slab.medium, spectrum({0.4}));
           scene.environment.radiance = spectrum({2});
@@ -99,6 +99,25 @@ TEST(PathScattering, EveryHonestSamplerMeetsSingleScattering) {
   }
   RecordProperty("walked", walked);
   EXPECT_GE(walked, 1);
+}
+
+/// A phase function so narrow that uniform directions all but never meet it: these would give about .2 of what is scattered.
+TEST(PathScattering, NarrowPhaseFunctionsMeetNextEventsByMis) {
+  const Vec3 lo(-1e4, -1e4, 0), hi(1e4, 1e4, 1);
+  TransportScene scene = scene_of(homogeneous(1.5, lo, hi), spectrum({1}));
+  scene.environment.radiance = spectrum({1});
+  for (const Real g : {0.999, -0.999}) {
+    scene.mean_cosine = g;
+    scene.options = {.next_event = NextEvent::mis, .roulette_from = {}, .most_scatterings = {}};
+    const Estimate all = radiance(kDelta, scene, camera({0.1, 0.2, -1}, {0, 0, 1}), 20000);
+    expect_mean(all, spectrum({1}));
+    EXPECT_LT(all.error[0], 0.01) << g;
+    scene.options.most_scatterings = 1;
+    const Estimate once = radiance(kDelta, scene, camera({0.1, 0.2, -1}, {0, 0, 1}), 20000);
+    // Scattered straight on or straight back, which the lobe's width changes by less than a hundredth.
+    const Real straight = g > 0 ? std::exp(-1.5) * 1.5 : -std::expm1(-3) / 2;
+    EXPECT_NEAR(once.mean[0] / (std::exp(-1.5) + straight), 1, 0.03) << g;
+  }
 }
 
 /// Without a limit, all orders at albedo a lie between the first order and a geometric bound: what is scattered n times is at

@@ -48,6 +48,7 @@ TransportScene make_transport_scene(const MediumSpec& medium, const BuiltMedium&
   scene.surfaces = build_surfaces(transport.surfaces, channels);
   scene.options.next_event = transport.next_event == "phase"     ? NextEvent::phase
                              : transport.next_event == "uniform" ? NextEvent::uniform
+                             : transport.next_event == "mis"     ? NextEvent::mis
                                                                  : NextEvent::off;
   scene.options.roulette_from = transport.roulette_from;
   scene.options.roulette_floor = transport.roulette_floor;
