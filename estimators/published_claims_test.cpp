@@ -69,5 +69,18 @@ TEST(PublishedDecomposition, StartsAnewAfterEveryNullCollision) {
   EXPECT_LT(*cells[1].channel[0].mean, 0.7 * right);
 }
 
+/// Its program's first lookup lies before the ray: T^(1 - 1/k), and of 2x the first 3 of 4 strata, whose integral is 9/16.
+TEST(PublishedStratified, LosesTheLastStratum) {
+  const auto exact = run_of(R"(["stratified_published_offset"])", R"({"type":"homogeneous","extinction":1})", 10);
+  EXPECT_NEAR(*exact[0].channel[0].mean, std::exp(-0.999), 1e-12);
+  EXPECT_EQ(*exact[0].lookups_per_sample, 999);
+  const auto linear =
+      run_of(R"([{"type":"stratified_published_offset","steps":4}])", R"({"type":"linear","optical_depth":1})", 400'000);
+  // Each of three lookups is uniform in a stratum of 1/4: a depth of 2x is off by a uniform error of width 1/8, whose exponential
+  // has the mean 16 sinh(1/16).
+  EXPECT_NEAR(*linear[0].channel[0].mean, std::exp(-9 / 16.) * std::pow(16 * std::sinh(1 / 16.), 3),
+              5 * std::sqrt(*linear[0].channel[0].variance / 400'000));
+}
+
 }  // namespace
 }  // namespace nullmark

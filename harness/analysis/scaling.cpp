@@ -19,11 +19,17 @@
 namespace nullmark {
 namespace {
 
+/// The number that a parameter is; a list of one number is one.
+std::optional<Real> number_of(const ParameterValue& value) {
+  if (const Real* real = std::get_if<Real>(&value)) return *real;
+  if (const int* whole = std::get_if<int>(&value)) return *whole;
+  if (const auto* list = std::get_if<std::vector<Real>>(&value); list && list->size() == 1) return list->front();
+  return std::nullopt;
+}
+
 void add_numbers(const std::string& prefix, const Component& component, std::map<std::string, Real>& numbers) {
-  for (const auto& [name, value] : component.values) {
-    if (const Real* real = std::get_if<Real>(&value)) numbers[prefix + name] = *real;
-    if (const int* whole = std::get_if<int>(&value)) numbers[prefix + name] = *whole;
-  }
+  for (const auto& [name, value] : component.values)
+    if (const std::optional<Real> number = number_of(value)) numbers[prefix + name] = *number;
 }
 
 /// All that a cell is but one of its parameters.
@@ -35,7 +41,7 @@ std::string without(const CellRecord& record, const std::map<std::string, Real>&
   // Text and lists stand in the labels alone; numbers do as well, but would tell the points of a series apart.
   for (const auto* component : {&record.cell.estimator, &record.medium.field, &record.majorant, &record.ray_set})
     for (const auto& [name, value] : component->values)
-      if (!std::holds_alternative<Real>(value) && !std::holds_alternative<int>(value)) key += "|" + name + ":" + to_text(value);
+      if (!number_of(value)) key += "|" + name + ":" + to_text(value);
   for (const MediumSpec& channel : record.medium.per_channel) key += "|" + channel.label;
   if (axis != "channels")
     for (const Real factor : record.medium.spectrum) key += fmt::format("|{}", factor);
@@ -79,12 +85,24 @@ std::optional<Interval> power_law(const std::vector<std::pair<Real, Real>>& poin
   return Interval{slope, slope - half, slope + half};
 }
 
+std::optional<Real> scaled_variance(const CellRecord& record) {
+  if (record.outputs.empty()) return metric(record, "relative_variance");
+  Real sum = 0;
+  const auto channels = static_cast<std::size_t>(record.channels);
+  for (std::size_t o = record.channel.size() - channels; o < record.channel.size(); ++o) {
+    if (!record.channel[o].relative_variance) return std::nullopt;
+    sum += *record.channel[o].relative_variance;
+  }
+  return sum / static_cast<Real>(channels);
+}
+
 std::vector<ScalingSeries> scaling_series(const RunRecord& run) {
   std::vector<ScalingSeries> all;
   std::map<std::string, std::vector<std::pair<Real, const CellRecord*>>> families;
   std::map<std::string, std::string> axes;
   for (const CellRecord& record : run.cells) {
-    if (record.status != Status::ok || !record.outputs.empty()) continue;
+    const bool one_number = record.outputs.empty() || record.cell.quantity == Quantity::free_path;
+    if (record.status != Status::ok || !one_number || record.cell.minus) continue;
     const std::map<std::string, Real> numbers = numeric_parameters(record);
     for (const auto& [axis, x] : numbers) {
       if (!(x > 0) || !std::isfinite(x)) continue;
@@ -119,7 +137,7 @@ std::vector<ScalingSeries> scaling_series(const RunRecord& run) {
     series.time = exponent(series, 0, time);
     series.time_upper = exponent(series, series.cells.size() / 2, time);
     series.lookups = exponent(series, 0, [](const CellRecord& record) { return record.lookups_per_sample; });
-    series.variance = exponent(series, 0, [](const CellRecord& record) { return metric(record, "relative_variance"); });
+    series.variance = exponent(series, 0, scaled_variance);
     all.push_back(std::move(series));
   }
   return all;

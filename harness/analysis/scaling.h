@@ -20,13 +20,17 @@ std::optional<Interval> power_law(const std::vector<std::pair<Real, Real>>& poin
 
 /// Cells that differ only in one parameter.
 struct ScalingSeries {
-  std::string axis;                       ///< the parameter
-  std::string tracker, rest;              ///< the tracker, and everything else that the cells share
-  std::vector<const CellRecord*> cells;   ///< by ascending parameter, three or more
-  std::vector<Real> x;                    ///< the parameter, > 0
+  std::string axis;                                 ///< the parameter
+  std::string tracker, rest;                        ///< the tracker, and everything else that the cells share
+  std::vector<const CellRecord*> cells;             ///< by ascending parameter, three or more
+  std::vector<Real> x;                              ///< the parameter, > 0
   std::optional<Interval> time, lookups, variance;  ///< exponents of ns, of lookups and of relative variance per sample
-  std::optional<Interval> time_upper;     ///< the same over the upper half of the points, if it has three
+  std::optional<Interval> time_upper;               ///< the same over the upper half of the points, if it has three
 };
+
+/// Variance of a sample over its squared mean, averaged over the channels; of a free path the variance of its weight, whose mean
+/// is 1.
+std::optional<Real> scaled_variance(const CellRecord& record);
 
 /// All such series of a run's sampled cells.
 std::vector<ScalingSeries> scaling_series(const RunRecord& run);

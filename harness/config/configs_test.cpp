@@ -97,12 +97,11 @@ TEST(Configs, Seed003RelationsAreMet) {
   }
 }
 
-/// Kozelj's Table 1: corrected within 2 % of theory at 256 x 256, as published within 4 % of the printed values; that picture has
-/// a quarter of its pixels here, which leaves its errors what they are (claim C09 has all of them).
+/// Kozelj's Table 1: corrected within 2 % of theory, as published within 4 % of the printed values.  Pictures have a quarter of their
+/// pixels here, which leaves their errors what they are (claims C08 and C09 have all of them).
 TEST(Configs, Seed004TableIsReproducedAndCorrected) {
   Plan plan = shipped("seed_004_table1.json");
-  for (Component& rays : plan.ray_sets)
-    if (rays.values.at("width") == ParameterValue(400)) rays.values["width"] = rays.values["height"] = 200;
+  for (Component& rays : plan.ray_sets) rays.values["width"] = rays.values["height"] = std::get<int>(rays.values.at("width")) / 2;
   for (Cell& cell : plan.cells) cell.verdict.enabled = false;
   const auto records = run_untimed(plan);
   struct Row {
@@ -124,6 +123,10 @@ TEST(Configs, Seed004TableIsReproducedAndCorrected) {
   for (const CellRecord& record : records) {
     if (record.cell.experiment == "corrected_marching") {
       EXPECT_LT(*record.channel[0].rmse, 1e-12) << record.cell.name;
+    }
+    // T = x^.999, rounded to 8 bits: a fifth above the printed .00079.
+    if (record.cell.estimator.type == "stratified_published_offset") {
+      EXPECT_NEAR(*record.channel[0].rmse, 0.00096, 0.0003) << record.cell.name;
     }
   }
 }

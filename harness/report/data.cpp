@@ -156,7 +156,7 @@ Json scaling_json(const std::vector<RunRecord>& runs, const Places& places) {
                           {"cell", places.at(&record)},
                           {"ns_per_sample", record.time ? interval(median_interval(record.time->repetition_ns)) : Json(nullptr)},
                           {"lookups", number_or_null(record.lookups_per_sample)},
-                          {"relative_variance", number_or_null(metric(record, "relative_variance"))}});
+                          {"relative_variance", number_or_null(scaled_variance(record))}});
       }
       list.push_back({{"axis", series.axis},
                       {"estimator", series.tracker},
