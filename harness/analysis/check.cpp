@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "harness/analysis/disagreements.h"
 #include "harness/config/cell_names.h"
 #include "harness/verdict/cell_word.h"
 #include "harness/verdict/verdict.h"
@@ -85,6 +86,12 @@ void count_cell(CellRecord& record, Summary& summary) {
     case Kind::fail:
       ++summary.fail;
       break;
+    case Kind::agree:
+      ++summary.agree;
+      break;
+    case Kind::differ:
+      ++summary.differ;
+      break;
     case Kind::expected_open:
       ++summary.expected_open;
       break;
@@ -122,10 +129,10 @@ bool has_order(const Summary& summary, Outcome outcome) {
 
 ExitCode exit_of(const Summary& summary) {
   const bool told = claim_decided(summary), untold = has_required(summary, ClaimOutcome::cannot_tell);
-  if (summary.fail > 0 || has_order(summary, Outcome::fail) || has_required(summary, ClaimOutcome::refuted))
+  if (summary.fail > 0 || summary.differ > 0 || has_order(summary, Outcome::fail) || has_required(summary, ClaimOutcome::refuted))
     return ExitCode::bias_proven;
   if (summary.errors > 0 || summary.altered > 0) return ExitCode::internal_error;
-  if (summary.pass + summary.expected_open + summary.unexpected_open + summary.violated == 0 && !told && !untold)
+  if (summary.pass + summary.agree + summary.expected_open + summary.unexpected_open + summary.violated == 0 && !told && !untold)
     return ExitCode::nothing_ran;
   const bool open = summary.never_started > 0 || summary.unexpected_open > 0 || (summary.pass == 0 && !told) || untold ||
                     !summary.nothing_proven.empty() || !summary.undecided_trackers.empty() ||
@@ -147,6 +154,7 @@ Summary summarise(RunRecord& run, bool strict) {
   if (summary.selected > run.cells.size()) summary.never_started += summary.selected - run.cells.size();
   summary.undecided_claims = undecided_claims(run);
   summary.undecided_trackers = undecided_trackers(run);
+  summary.disagreements = disagreements(run);
   summary.orders = fit_orders(run.cells);
   summary.findings = findings(run);
   if (summary.pass > 0 && summary.pass == summary.own_mean && !has_order(summary, Outcome::pass) && !claim_decided(summary))

@@ -15,14 +15,16 @@ namespace nullmark {
 /// The conclusions of `check` about a run; every verdict is derived again from the figures in the record.
 struct Summary {
   std::size_t pass = 0;
-  std::size_t own_mean = 0;  ///< PASSes of the mean that a tracker predicts for itself
+  std::size_t own_mean = 0;           ///< PASSes of the mean that a tracker predicts for itself
+  std::size_t agree = 0, differ = 0;  ///< pairs of trackers
   std::size_t fail = 0, expected_open = 0, unexpected_open = 0, violated = 0, errors = 0, not_run = 0, unclaimed = 0;
-  std::size_t configured = 0;        ///< cells of the configuration
-  std::size_t selected = 0;          ///< cells that the run was to cover: selected by `--filter`, regardless of `--shard`
-  std::size_t never_started = 0;     ///< interrupted, out of time, or absent from the file though selected
-  std::size_t undecided_claims = 0;  ///< cells that claim something and neither passed nor failed, including skipped ones
-  bool strict = false;               ///< each undecided claim then prevents success
-  std::size_t altered = 0;           ///< verdicts in the file that contradict its figures
+  std::size_t configured = 0;              ///< cells of the configuration
+  std::size_t selected = 0;                ///< cells that the run was to cover: selected by `--filter`, regardless of `--shard`
+  std::size_t never_started = 0;           ///< interrupted, out of time, or absent from the file though selected
+  std::size_t undecided_claims = 0;        ///< cells that claim something and neither passed nor failed, including skipped ones
+  bool strict = false;                     ///< each undecided claim then prevents success
+  std::size_t altered = 0;                 ///< verdicts in the file that contradict its figures
+  std::vector<std::string> disagreements;  ///< see disagreements.h
   /// Trackers whose claim no cell decides: "delta claims unbiased and no cell decides it".
   std::vector<std::string> undecided_trackers;
   /// Why the cells that passed are not enough for success; empty if they are.

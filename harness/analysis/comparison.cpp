@@ -292,7 +292,7 @@ std::vector<Comparison> comparisons(const std::vector<RunRecord>& runs, const st
   std::set<std::string> types;
   for (std::size_t run = 0; run < runs.size(); ++run)
     for (const CellRecord& record : runs[run].cells) {
-      if (record.status != Status::ok || !record.outputs.empty()) continue;
+      if (record.status != Status::ok || !record.outputs.empty() || record.cell.minus) continue;
       Comparison comparison = empty_comparison(record);
       const auto [place, fresh] = places.try_emplace(comparison.name, all.size());
       if (fresh) all.push_back(std::move(comparison));

@@ -60,7 +60,8 @@ Axis swept_axis(const char* name, Read read, ReadPattern read_pattern, Member me
       name,
       [=](const JsonNode& node) { return setters(joined(node, read), [=](auto& c, const auto& value) { member(c) = value; }); },
       [=](const JsonNode& node) {
-        return any_fits(read_pattern(node), [=](auto& c, const auto& pattern) { return matches(pattern, *member(c)); });
+        return any_fits(read_pattern(node),
+                        [=](auto& c, const auto& pattern) { return member(c) && matches(pattern, *member(c)); });
       },
       [=](const ConfiguredCell& a, const ConfiguredCell& b) { return member(a) == member(b); },
       definition(name),
@@ -72,6 +73,14 @@ Axis component_axis(const char* name, ComponentKind kind, Member member) {
   return swept_axis(
       name, [kind](const JsonNode& node) { return read_components(kind, node); },
       [kind](const JsonNode& node) { return read_component_patterns(kind, node); }, member);
+}
+
+/// A second tracker, defined as estimators are.
+Axis minus_axis() {
+  Axis minus = component_axis(
+      "minus", ComponentKind::estimator, [](auto& c) -> auto& { return c.minus; });
+  minus.schema = described({{"anyOf", {definition("estimator")}}}, "a second tracker, whose samples are subtracted");
+  return minus;
 }
 
 /// Samples are counted, or follow from lookups.
@@ -125,6 +134,7 @@ const std::vector<Axis>& axes() {
   static const std::vector<Axis> kAxes = {
       component_axis(
           "estimator", ComponentKind::estimator, [](auto& c) -> auto& { return c.estimator; }),
+      minus_axis(),
       swept_axis(
           "medium", read_media, read_medium_patterns, [](auto& c) -> auto& { return c.medium; }),
       component_axis(

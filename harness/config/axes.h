@@ -13,7 +13,7 @@ namespace nullmark {
 /// A cell during the expansion of its experiment: it holds specifications instead of indices.
 struct ConfiguredCell {
   std::string experiment;  ///< its name in the file
-  std::optional<Component> estimator, rays;
+  std::optional<Component> estimator, minus, rays;
   std::optional<MediumSpec> medium;
   std::optional<Component> majorant;
   bool has_samples = false;

@@ -32,6 +32,7 @@ class PlanBuilder {
   void add(const ConfiguredCell& configured) {
     Cell cell = configured.cell;
     cell.estimator = *configured.estimator;
+    cell.minus = configured.minus;
     cell.medium = media_.index_of(plan_.media, *configured.medium);
     plan_.media[cell.medium].optional &= configured.medium->optional;
     cell.majorant = majorants_.index_of(plan_.majorants, *configured.majorant);

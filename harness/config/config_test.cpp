@@ -199,7 +199,7 @@ TEST(Config, ErrorsAreOneLineWithPlaceAndRemedy) {
        R"(t.json: /experiments/0/matrix/medium/lo: found [0,0]; expected a list of 3 numbers)"},
       {matrix(R"([])", R"("linear")"), R"(t.json: /experiments/0/matrix/estimator: found []; expected at least one value)"},
       {matrix(R"("ratio")", R"("linear")", R"(,"samples":[1])"),
-       R"(t.json: /experiments/0/matrix/samples: unknown key "samples"; expected one of "estimator", "medium", "majorant", "rays", "quantity", "samples_per_ray", "equal_lookups", "seed", "measurement", "transport", "precision", "lanes")"},
+       R"(t.json: /experiments/0/matrix/samples: unknown key "samples"; expected one of "estimator", "minus", "medium", "majorant", "rays", "quantity", "samples_per_ray", "equal_lookups", "seed", "measurement", "transport", "precision", "lanes")"},
       {matrix(R"("ratio")", R"("linear")", R"(,"samples_per_ray":[10])"),
        R"(t.json: /experiments/0/samples_per_ray: found here and in "matrix"; expected one of the two)"},
       {experiment(R"("matrix":{"estimator":"ratio","medium":"linear"},"qantity":"transmittance")"),

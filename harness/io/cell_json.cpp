@@ -1,159 +1,13 @@
 #include <fmt/format.h>
 
-#include <limits>
-
+#include "harness/io/component_fields.h"
 #include "harness/io/results_json.h"
-#include "harness/io/spec_fields.h"
-#include "harness/io/spec_json.h"
-#include "harness/io/transport_json.h"
 #include "harness/io/verdict_json.h"
 #include "harness/model/cost.h"
 #include "harness/model/metrics.h"
-#include "harness/registry/components.h"
 
 namespace nullmark {
 namespace {
-
-/// A point and a list of three numbers look alike in JSON; only the registry can tell.
-bool is_point(ComponentKind kind, const std::string& type, const std::string& parameter) {
-  try {
-    for (const ParameterInfo& info : parameters_of(kind, type))
-      if (info.name == parameter) return std::holds_alternative<std::array<Real, 3>>(info.default_value);
-  } catch (const ParameterError&) {
-    // Results of plug-ins that are not linked in can be read all the same.
-  }
-  return false;
-}
-
-ParameterValue read_parameter(ComponentKind kind, const std::string& type, const std::string& name, const JsonNode& node) {
-  const Json& json = node.json();
-  if (json.is_boolean()) return json.get<bool>();
-  if (json.is_number_float()) return json.get<Real>();
-  if (json.is_number()) return static_cast<int>(node.integer(std::numeric_limits<int>::min(), std::numeric_limits<int>::max()));
-  if (!json.is_array()) return node.string();
-  if (!json.empty() && json[0].is_string()) {
-    std::vector<std::string> words;
-    for (const JsonNode& element : node.elements()) words.push_back(element.string());
-    return words;
-  }
-  std::vector<Real> numbers;
-  for (const JsonNode& element : node.elements()) numbers.push_back(element.number());
-  if (numbers.size() == 3 && is_point(kind, type, name)) return std::array{numbers[0], numbers[1], numbers[2]};
-  return numbers;
-}
-
-/// The parameters of a registered type.
-struct ParametersField {
-  Component& component;
-  ComponentKind kind;
-
-  Json json() const { return parameters_json(component.values); }
-  void read(const JsonNode& node) const {
-    node.expect_object();
-    for (const auto& [name, json] : node.json().items())
-      component.values[name] = read_parameter(kind, component.type, name, node[name]);
-  }
-  Json schema() const { return {{"type", "object"}}; }
-};
-
-template <class Visit>
-void visit_component(Visit& visit, Component& component, ComponentKind kind, std::string& label) {
-  visit.required("type", component.type);
-  visit.required("params", ParametersField{component, kind});
-  visit.required("label", label);
-  if constexpr (Visit::kReads) component.pointer = visit.node().where();
-}
-
-struct ComponentField {
-  Component& component;
-  ComponentKind kind;
-
-  Json json() const {
-    FieldWriter visit;
-    visit_component(visit, component, kind, component.label);
-    return visit.take();
-  }
-  void read(const JsonNode& node) const {
-    FieldReader visit(node);
-    visit_component(visit, component, kind, component.label);
-  }
-  Json schema() const {
-    FieldSchema visit(false);
-    visit_component(visit, component, kind, component.label);
-    return visit.take();
-  }
-};
-
-Json medium_record_json(const MediumSpec& medium);
-MediumSpec read_medium_record(const JsonNode& node);
-
-struct MediaField {
-  std::vector<MediumSpec>& media;
-
-  bool empty() const { return media.empty(); }
-  Json json() const {
-    Json list = Json::array();
-    for (const MediumSpec& medium : media) list.push_back(medium_record_json(medium));
-    return list;
-  }
-  void read(const JsonNode& node) const {
-    for (const JsonNode& medium : node.elements()) media.push_back(read_medium_record(medium));
-  }
-  Json schema() const { return list_schema({{"type", "object"}}); }
-};
-
-/// Numbers from 0 to `most`, one for all channels or one each.
-struct PerChannelField {
-  std::vector<Real>& values;
-  Real most;
-
-  bool empty() const { return values.empty(); }
-  Json json() const { return values; }
-  void read(const JsonNode& node) const { values = read_per_channel(node, most); }
-  Json schema() const { return list_schema({{"type", "number"}, {"minimum", 0}}); }
-};
-
-/// {"radiance": ..., "field": ...}
-struct EmissionField {
-  MediumSpec& medium;
-
-  bool empty() const { return medium.emission.empty(); }
-  Json json() const {
-    Json json = {{"radiance", medium.emission}};
-    if (!medium.emission_field.empty()) json["field"] = medium_record_json(medium.emission_field[0]);
-    return json;
-  }
-  void read(const JsonNode& node) const {
-    medium.emission = read_per_channel(node["radiance"], kInfinity);
-    if (node.has("field")) medium.emission_field.push_back(read_medium_record(node["field"]));
-  }
-  Json schema() const { return {{"type", "object"}}; }
-};
-
-}  // namespace
-
-template <class Visit>
-void visit_fields(Visit& visit, MediumSpec& medium) {
-  visit_component(visit, medium.field, ComponentKind::medium, medium.label);
-  if constexpr (Visit::kReads) medium.field.label = medium.label;
-  visit.sparse("spectrum", medium.spectrum);
-  visit.sparse("media", MediaField{medium.per_channel});
-  visit.sparse("albedo", PerChannelField{medium.albedo, 1});
-  visit.sparse("albedo_field", MediaField{medium.albedo_field});
-  visit.sparse("anisotropy", medium.anisotropy);
-  visit.sparse("emission", EmissionField{medium});
-  visit.sparse("optional", medium.optional);
-}
-
-namespace {
-
-Json medium_record_json(const MediumSpec& medium) { return fields_json(medium); }
-
-MediumSpec read_medium_record(const JsonNode& node) {
-  MediumSpec medium;
-  read_fields(node, medium);
-  return medium;
-}
 
 Json reals_schema() { return {{"type", {"number", "array", "null"}}, {"items", {{"type", {"number", "null"}}}}}; }
 
@@ -290,6 +144,7 @@ void visit_cell(Visit& visit, CellRecord& record) {
     inner.sparse("unrepeatable", record.tracker.unrepeatable, "its samples cannot be drawn again");
     inner.sparse("given_depth", record.given_depth, "the estimator is handed the exact optical depth");
   });
+  visit.sparse("minus", OptionalEstimatorField{cell.minus}, "a second tracker, whose samples are subtracted");
   visit.part("medium", [&](auto& inner) {
     visit_fields(inner, record.medium);
     inner.lenient("hash", record.medium_hash);

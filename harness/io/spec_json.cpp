@@ -29,6 +29,7 @@ Json deciding_json(const Plan& plan, const Cell& cell) {
                {"rays", component_json(plan.ray_sets[cell.rays])},
                {"quantity", to_string(cell.quantity)},
                {"measurement", fields_json(cell.measurement)}};
+  if (cell.minus) json["minus"] = component_json(*cell.minus);
   if (cell.transport != TransportSpec{}) json["transport"] = transport_json(cell.transport);
   if (cell.precision != Precision::float64) json["precision"] = to_string(cell.precision);
   if (!cell.lanes) json["lanes"] = false;

@@ -13,7 +13,7 @@ namespace {
 constexpr int kMaxOutputs = kMaxChannels * (static_cast<int>(kFreePathBins) + 3);
 
 const std::vector<std::string> kBases = {"betting", "catoni", "catoni+betting", "deterministic", "none", "counted"};
-const std::vector<std::string> kTargets = {"reference", "own mean"};
+const std::vector<std::string> kTargets = {"reference", "own mean", "difference"};
 const std::vector<std::string> kVarianceBases = {"analytic", "pilot", "none"};
 
 // An infinite figure is written as null: evidence that is not there proves nothing, an error that is not finite is the largest.

@@ -60,9 +60,10 @@ std::optional<Cost> cost_of(const CellRecord& record) {
   bool analytic = true, errors_known = true;
   for (const ChannelRecord& channel : record.channel) {
     const std::optional<Real>& best = best_variance(channel);
-    if (!best || !channel.reference) return std::nullopt;
+    const std::optional<Real>& mean = channel.reference ? channel.reference : channel.mean;
+    if (!best || !mean) return std::nullopt;
     variance += *best;
-    reference += square(channel.reference_rms.value_or(std::abs(*channel.reference)));
+    reference += square(channel.reference_rms.value_or(std::abs(*mean)));
     errors_known = errors_known && channel.rmse;
     mean_square_error += square(channel.rmse.value_or(0));
     if (channel.variance_theory) continue;

@@ -14,7 +14,8 @@ namespace nullmark {
 inline constexpr Real kRounding = 1e-10;
 
 /// Cost of accuracy in one cell, averaged over its channels.  n samples of a ray have the mean squared error V / n + (floor R)^2
-/// and take n times the time of one.  R is the root mean square of the reference.
+/// and take n times the time of one.  R is the root mean square of the reference, or the mean of the samples where no mean is
+/// known.
 struct Cost {
   bool analytic = false;  ///< the variance comes from theory
   Real reference = 0;     ///< R
@@ -37,7 +38,7 @@ bool stands_unbiased(const CellRecord& record);
 /// seen.
 bool variance_is_uncertain(const CellRecord& record, const ChannelRecord& channel);
 
-/// Nothing if a channel's reference or variance is unknown, the reference is 0, or the cell has several outputs per channel.
+/// Nothing if a channel's mean or variance is unknown, the reference is 0, or the cell has several outputs per channel.
 std::optional<Cost> cost_of(const CellRecord& record);
 
 /// Samples per ray for the relative error `target`: V / ((target^2 - floor^2) R^2), at least 1; infinite if the floor is above

@@ -66,7 +66,7 @@ struct SurfaceSpec {
 struct TransportSpec {
   std::vector<Real> environment;  ///< radiance, one for all channels or one each; empty: 0
   std::vector<SurfaceSpec> surfaces;
-  std::string next_event = "off";        ///< "off", "phase" or "uniform"
+  std::string next_event = "off";        ///< "off", "phase", "uniform" or "mis"
   std::optional<int> roulette_from = 4;  ///< number of scatterings; absent: no roulette
   Real roulette_floor = 0.05;
   std::optional<int> most_scatterings{};  ///< absent: all light
@@ -126,6 +126,9 @@ struct Cell {
   std::string name;  ///< "estimator/medium/majorant", unique in the plan (experiment and seed are prefixed where needed)
   std::string experiment;
   Component estimator;
+  /// A second tracker, on streams of its own, whose samples are subtracted: the difference has the mean 0 where both are
+  /// unbiased.
+  std::optional<Component> minus{};
   std::size_t medium = 0, majorant = 0, rays = 0;
   Quantity quantity = Quantity::transmittance;
   Precision precision = Precision::float64;

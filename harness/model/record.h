@@ -99,16 +99,17 @@ struct VerdictRecord {
   std::string proves;  ///< what a PASS proves: "|bias| < 0.37 % of the mean"
   Tolerate tolerate = Tolerate::nothing;
   bool within = false, beyond = false, biased = false;  ///< what is proven of the mean error: see verdict.h
-  std::string against;                                  ///< "reference", or "own mean" of an estimator that predicts its bias
-  std::string variance_basis;                           ///< "analytic", "pilot" or "none"
-  bool planned_undecidable = false;                     ///< the plan found that no affordable number of samples decides
-  bool violated = false;                                ///< needs a true majorant, and the extinction was seen above it
-  bool bound_unproven = false;                          ///< the majorant is not known to bound, and nothing was seen above it
-  std::uint64_t counted_walks = 0;                      ///< walks whose lookups were checked to be their collisions, one by one
-  std::uint64_t nonfinite = 0;                          ///< number among the samples beyond samples_per_ray of the cell
-  std::uint64_t out_of_range = 0;                       ///< samples outside the range the estimator declares
-  std::uint64_t samples_per_ray = 0;                    ///< drawn in total
-  std::uint64_t planned = 0, affordable = 0;            ///< samples per ray
+  /// "reference"; "own mean" of an estimator that predicts its bias; "difference" of two trackers, which is 0.
+  std::string against;
+  std::string variance_basis;                 ///< "analytic", "pilot" or "none"
+  bool planned_undecidable = false;           ///< the plan found that no affordable number of samples decides
+  bool violated = false;                      ///< needs a true majorant, and the extinction was seen above it
+  bool bound_unproven = false;                ///< the majorant is not known to bound, and nothing was seen above it
+  std::uint64_t counted_walks = 0;            ///< walks whose lookups were checked to be their collisions, one by one
+  std::uint64_t nonfinite = 0;                ///< number among the samples beyond samples_per_ray of the cell
+  std::uint64_t out_of_range = 0;             ///< samples outside the range the estimator declares
+  std::uint64_t samples_per_ray = 0;          ///< drawn in total
+  std::uint64_t planned = 0, affordable = 0;  ///< samples per ray
   std::uint64_t family = 1, lookups_family = 1;
   Real alpha = 1e-4, alpha_pass = 1e-3;
   std::vector<TestRecord> tests;

@@ -29,11 +29,13 @@ std::string marks_among(const RunRecord& run, Kind kind) {
 
 std::string counts(const RunRecord& run, const Summary& s) {
   return fmt::format(
-      "{} PASS{}, {} FAIL{}, {} INCONCLUSIVE as planned{}, {} INCONCLUSIVE{}, {} VIOLATED, {} errors, {} not run, {} claim "
-      "nothing",
-      s.pass, marks_among(run, Kind::pass), s.fail, marks_among(run, Kind::fail), s.expected_open,
-      marks_among(run, Kind::expected_open), s.unexpected_open, marks_among(run, Kind::unexpected_open), s.violated, s.errors,
-      s.not_run, s.unclaimed);
+             "{} PASS{}, {} FAIL{}, {} INCONCLUSIVE as planned{}, {} INCONCLUSIVE{}, {} VIOLATED, {} errors, {} not run, {} "
+             "claim "
+             "nothing",
+             s.pass, marks_among(run, Kind::pass), s.fail, marks_among(run, Kind::fail), s.expected_open,
+             marks_among(run, Kind::expected_open), s.unexpected_open, marks_among(run, Kind::unexpected_open), s.violated,
+             s.errors, s.not_run, s.unclaimed) +
+         (s.agree + s.differ > 0 ? fmt::format(", {} AGREE, {} DIFFER", s.agree, s.differ) : "");
 }
 
 std::string order_line(const OrderFit& fit) {
@@ -70,6 +72,7 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
   if (summary.never_started > 0)
     lines.push_back(fmt::format("{} cells of the configuration were never started", summary.never_started));
   if (summary.altered > 0) lines.push_back(fmt::format("{} verdicts in the file are not what its figures say", summary.altered));
+  lines.insert(lines.end(), summary.disagreements.begin(), summary.disagreements.end());
   lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());
   if (!summary.nothing_proven.empty()) lines.push_back(summary.nothing_proven);
   for (const ClaimFinding& one : summary.findings)
@@ -100,12 +103,12 @@ std::string families(const RunRecord& run) {
 /// Whether a list of verdicts has the cell: all that are no plain PASS and claim something.
 bool is_listed(const CellRecord& record) {
   const Kind kind = kind_of(record);
-  return kind != Kind::unclaimed && (kind != Kind::pass || !marks_of(record).empty());
+  return kind != Kind::unclaimed && ((kind != Kind::pass && kind != Kind::agree) || !marks_of(record).empty());
 }
 
 /// Whether somebody should look at a cell of the kind: always, and where every claim must be decided.
 bool needs_attention(Kind kind, bool strict) {
-  if (kind == Kind::fail || kind == Kind::error || kind == Kind::unexpected_open) return true;
+  if (kind == Kind::fail || kind == Kind::differ || kind == Kind::error || kind == Kind::unexpected_open) return true;
   return strict && (kind == Kind::expected_open || kind == Kind::violated || kind == Kind::not_run);
 }
 
@@ -162,8 +165,8 @@ std::string summary_text(const RunRecord& run, const Summary& summary, bool all)
   });
   const bool grouped = !all && quiet > kFew;
   std::string text = grouped ? grouped_lines(run, summary.strict) : "";
-  for (const Kind kind :
-       {Kind::pass, Kind::violated, Kind::expected_open, Kind::not_run, Kind::unexpected_open, Kind::error, Kind::fail})
+  for (const Kind kind : {Kind::pass, Kind::agree, Kind::violated, Kind::expected_open, Kind::not_run, Kind::unexpected_open,
+                          Kind::error, Kind::differ, Kind::fail})
     for (const CellRecord& record : run.cells)
       if (kind_of(record) == kind && is_listed(record) && (!grouped || needs_attention(kind, summary.strict)))
         text += cell_line(record);
@@ -195,11 +198,11 @@ std::string summary_markdown(const RunRecord& run, const Summary& summary, const
           fmt::format("\n<details{}><summary>{} ({})</summary>\n\n| verdict | cell | reason |\n|---|---|---|\n{}\n</details>\n",
                       commands ? " open" : "", title, count, rows);
   };
-  table({Kind::fail, Kind::error}, "Biased, or not computed", true);
+  table({Kind::fail, Kind::differ, Kind::error}, "Biased, or not computed", true);
   table({Kind::unexpected_open}, "Undecided", false);
   table({Kind::expected_open}, "Undecidable by their mean, as planned", false);
   table({Kind::violated}, "Need a true majorant and did not have one", false);
-  table({Kind::pass}, "Passed, with a mark", false);
+  table({Kind::pass, Kind::agree}, "Passed, with a mark", false);
   if (!summary.findings.empty()) text += fmt::format("\n{}", findings_markdown(summary.findings));
   if (!summary.orders.empty()) {
     text += "\n| convergence order |\n|---|\n";

@@ -24,8 +24,10 @@ Ending ending(const CellRecord& record) {
   const auto says = [&] { return finding.empty() ? marked_word(record) : fmt::format("{}: {}", marked_word(record), finding); };
   switch (kind_of(record)) {
     case Kind::pass:
+    case Kind::agree:
       return {"", says()};
     case Kind::fail:
+    case Kind::differ:
       return {"failure", says()};
     case Kind::error:
       return {"error", finding};

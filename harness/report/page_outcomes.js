@@ -1,6 +1,6 @@
 // The words of verdicts: their badges, what they mean, how often each occurs.
 
-const outcomeMarks = { PASS: "✓", FAIL: "✗", VIOLATED: "!", INCONCLUSIVE: "?", "INCONCLUSIVE (as planned)": "?" };
+const outcomeMarks = { PASS: "✓", FAIL: "✗", AGREE: "✓", DIFFER: "✗", VIOLATED: "!", INCONCLUSIVE: "?", "INCONCLUSIVE (as planned)": "?" };
 
 function outcomeBadge(text, word = text, more = {}) {
   const kind = word.split(" ")[0].toLowerCase();
@@ -10,6 +10,8 @@ function outcomeBadge(text, word = text, more = {}) {
 const outcomeMeanings = {
   PASS: "a bias above epsilon is ruled out",
   FAIL: "bias is proven, or lookups or walks break a law",
+  AGREE: "the means of two trackers differ by less than twice epsilon; equal biases would not show",
+  DIFFER: "the means of two trackers differ: one of them is biased",
   INCONCLUSIVE: "neither bias nor its absence is proven, though the plan foresaw a decision",
   "INCONCLUSIVE (as planned)": "the plan said beforehand that no affordable number of samples decides",
   "nothing claimed": "the estimator claims nothing here, nothing was tested, or the configuration disables the verdict",
@@ -26,7 +28,7 @@ function outcomeMeaning(word) {
   return word === "VIOLATED" ? violationsText() : outcomeMeanings[word] ?? "see the reasons in the table of every cell";
 }
 
-const verdictWords = ["PASS", "FAIL", "VIOLATED", "INCONCLUSIVE", "INCONCLUSIVE (as planned)", "ERROR", "not run", "nothing claimed"];
+const verdictWords = ["PASS", "FAIL", "AGREE", "DIFFER", "VIOLATED", "INCONCLUSIVE", "INCONCLUSIVE (as planned)", "ERROR", "not run", "nothing claimed"];
 
 /** How many cells of a word have each mark: "(3 by pilot, 1 own mean)". */
 function marksText(cells) {

@@ -59,7 +59,7 @@ function verdictKey(cells) {
 /** PASS count, and counts of words that need attention. */
 function shortCounts(cells) {
   const counts = new Map(wordCounts(cells));
-  const told = ["FAIL", "ERROR", "INCONCLUSIVE", "VIOLATED"].filter((word) => counts.has(word));
+  const told = ["FAIL", "DIFFER", "ERROR", "INCONCLUSIVE", "VIOLATED"].filter((word) => counts.has(word));
   const passed = `${counts.get("PASS") ?? 0} of ${cells.length} PASS`;
   return element("span", { title: countsText(cells) }, [passed, ...told.map((word) => `${counts.get(word)} ${word}`)].join(", "));
 }

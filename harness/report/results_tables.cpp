@@ -55,7 +55,8 @@ std::string status_of(const CellRecord& record) {
   std::string text = to_string(record.status);
   if (!record.reason.empty()) text += ": " + record.reason;
   const Kind kind = kind_of(record);
-  if (const std::string finding = finding_of(record); (kind == Kind::pass || kind == Kind::fail) && !finding.empty())
+  if (const std::string finding = finding_of(record);
+      (kind == Kind::pass || kind == Kind::fail || kind == Kind::agree || kind == Kind::differ) && !finding.empty())
     text += ", " + finding;
   return text;
 }

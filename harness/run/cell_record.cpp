@@ -124,6 +124,7 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
     record.range = to_string(entry->foreign ? prepared.range : entry->range);
     record.order = source->order(cell.quantity);
     if (const auto identity = source->identity()) record.tracker = tracker_record(*identity);
+    if (prepared.subtracted) record.claims = to_string(prepared.claim);
   }
   if (prepared.scene) {
     record.channels = prepared.scene->medium->medium->channels();

@@ -309,7 +309,7 @@ std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::v
       [&](std::size_t i) {
         const auto record = records.find(i);
         return timing && record != records.end() && record->second->status == Status::ok && !record->second->time &&
-               record->second->build.empty();
+               record->second->build.empty() && !plan.cells[i].minus;
       },
       ended);
   clock.end("preparation");
@@ -325,7 +325,7 @@ std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::v
   Effort effort;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     effort += outcomes[i].effort;
-    if (outcomes[i].record->status == Status::ok) to_time.push_back(&cells[i]);
+    if (outcomes[i].record->status == Status::ok && !cells[i].subtracted) to_time.push_back(&cells[i]);
     records[cells[i].index] = std::move(outcomes[i].record);
   }
   if (timing && !to_time.empty() && !ended()) {

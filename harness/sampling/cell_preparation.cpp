@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/kernel/difference_kernel.h"
 #include "harness/kernel/path_kernel.h"
 #include "harness/model/in_flight.h"
 #include "harness/model/names.h"
@@ -72,14 +73,48 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
   return prepared;
 }
 
-/// The tracker of a cell whose scene is built.
+/// The kernel of a cell whose scene is built, and what its samples should average to.
 void CellPreparer::add_kernel(PreparedCell& prepared) {
   const Cell& cell = *prepared.cell;
-  const std::shared_ptr<const EstimatorSource> source =
-      located(cell.estimator.pointer, [&] { return make_estimator(cell.estimator); });
-  located(cell.estimator.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
+  add_tracker(prepared, cell.estimator);
+  if (cell.minus && prepared.reason.empty()) subtract(prepared, *cell.minus);
+  if (!prepared.reason.empty()) return;
+  prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity,
+                                     cell.minus ? std::optional<GivenReference>() : cell.reference);
+  if (!cell.minus) return;
+  prepared.targets.error.assign(prepared.targets.error.size(), 0);
+  prepared.targets.method = "difference";
+}
+
+/// Both trackers of a difference must be unbiased for its mean to be 0, and where both have samples in [0, 1] it lies in [-1, 1].
+void CellPreparer::subtract(PreparedCell& prepared, const Component& tracker) {
+  if (Registry<EstimatorEntry>::instance().find(tracker.type)->foreign)
+    throw ParameterError(
+        tracker.pointer,
+        fmt::format("found the tracker \"{}\" from outside; expected one of nullmark to subtract", tracker.type));
+  PreparedCell second = prepared;
+  add_tracker(second, tracker);
+  prepared.reason = second.reason;
+  if (!prepared.reason.empty()) return;
+  const auto honest = [](Guarantee claim) { return claim == Guarantee::unbiased || claim == Guarantee::exact; };
+  const auto in_unit = [](SampleRange range) { return range == SampleRange::binary || range == SampleRange::unit; };
+  prepared.claim = honest(prepared.claim) && honest(second.claim) ? Guarantee::unbiased : Guarantee::biased;
+  prepared.range = in_unit(prepared.range) && in_unit(second.range) ? SampleRange::unit : SampleRange::any_sign;
+  prepared.needs_bound |= second.needs_bound;
+  prepared.takes_part |= second.takes_part;
+  prepared.subtracted = second.kernel;
+  prepared.kernel = make_difference_kernel(prepared.kernel, second.kernel);
+  if (!prepared.kernel->answers(prepared.cell->quantity))
+    prepared.reason = fmt::format("differences of a {} are not drawn", to_string(prepared.cell->quantity));
+}
+
+/// A tracker for a cell whose scene is built.
+void CellPreparer::add_tracker(PreparedCell& prepared, const Component& tracker) {
+  const Cell& cell = *prepared.cell;
+  const std::shared_ptr<const EstimatorSource> source = located(tracker.pointer, [&] { return make_estimator(tracker); });
+  located(tracker.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
   // A tracker from outside is opened here.
-  located(cell.estimator.pointer, [&] {
+  located(tracker.pointer, [&] {
     prepared.claim = source->claim(cell.quantity);
     prepared.range = source->range(prepared.scene->medium->medium->channels());
     prepared.needs_bound = source->needs_bound();
@@ -90,10 +125,8 @@ void CellPreparer::add_kernel(PreparedCell& prepared) {
     add_light(prepared, *source);
   } else {
     prepared.kernel = source->kernel(prepared.scene->medium->medium->channels(), cell.precision, cell.lanes);
-    prepared.reason = why_not(cell, *prepared.scene, prepared.kernel.get());
+    prepared.reason = why_not(cell, tracker, *prepared.scene, prepared.kernel.get());
   }
-  if (prepared.reason.empty())
-    prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity, cell.reference);
 }
 
 /// The kernel of a radiance, composed from the scene's effects.
@@ -119,17 +152,17 @@ void CellPreparer::add_light(PreparedCell& prepared, const EstimatorSource& sour
                                                              : SampleRange::non_negative;
 }
 
-std::string CellPreparer::why_not(const Cell& cell, const Scene& scene, const Kernel* made) {
+std::string CellPreparer::why_not(const Cell& cell, const Component& tracker, const Scene& scene, const Kernel* made) {
   const int channels = scene.medium->medium->channels();
   if (!made)
     return channels > 1 ? fmt::format("{} channels have no form in float; expected precision \"double\"", channels)
-                        : fmt::format("{} has no form in float; expected precision \"double\"", cell.estimator.type);
+                        : fmt::format("{} has no form in float; expected precision \"double\"", tracker.type);
   const Kernel& kernel = *made;
   if (!kernel.answers(cell.quantity))
-    return fmt::format("{} does not answer {}{}", cell.estimator.type, to_string(cell.quantity),
+    return fmt::format("{} does not answer {}{}", tracker.type, to_string(cell.quantity),
                        cell.precision == Precision::float32 ? " in float" : "");
   if (scene.medium->albedo_field && cell.quantity == Quantity::free_path &&
-      Registry<EstimatorEntry>::instance().find(cell.estimator.type)->foreign)
+      Registry<EstimatorEntry>::instance().find(tracker.type)->foreign)
     return "trackers from outside are told one albedo for a ray, and the medium's varies";
   const bool single = cell.precision == Precision::float32;
   const Box box = scene.medium->medium->bounds();

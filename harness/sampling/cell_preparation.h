@@ -19,6 +19,7 @@ struct PreparedCell {
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const EstimatorSource> source;  ///< null if nothing of the estimator was built
   std::shared_ptr<const Kernel> kernel;
+  std::shared_ptr<const Kernel> subtracted;  ///< of the tracker that `kernel` subtracts; null where none is
   std::string reason, failure;
   std::vector<std::string> effects;  ///< of a radiance kernel
   bool takes_part = true;            ///< false: flights are closed forms, and the estimator is not used
@@ -52,8 +53,10 @@ class CellPreparer {
 
  private:
   void add_kernel(PreparedCell& prepared);
+  void add_tracker(PreparedCell& prepared, const Component& tracker);
+  void subtract(PreparedCell& prepared, const Component& tracker);
   void add_light(PreparedCell& prepared, const EstimatorSource& source) const;
-  std::string why_not(const Cell& cell, const Scene& scene, const Kernel* made);
+  std::string why_not(const Cell& cell, const Component& tracker, const Scene& scene, const Kernel* made);
   Real deepest_majorant(const Scene& scene);
   std::shared_ptr<const Scene> scene(const Cell& cell);
   std::shared_ptr<const BuiltMedium> medium(std::size_t index);

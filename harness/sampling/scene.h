@@ -17,7 +17,7 @@ struct BuiltMedium {
   MatterBounds extrema;
   Spectrum albedo;                                  ///< mu_s / mu per channel, its most where it varies
   std::shared_ptr<const AlbedoField> albedo_field;  ///< where it varies in space
-  Box world_bounds;
+  Box world_bounds{};
   std::uint64_t hash = 0;  ///< of the specification and of the data behind it
 };
 

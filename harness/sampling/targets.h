@@ -13,6 +13,7 @@ struct Targets {
   std::size_t outputs = 1;         ///< numbers per sample
   std::vector<std::string> names;  ///< per output; empty if outputs are channels
   std::vector<Real> mean, error;   ///< [ray * outputs + o]; `error` bounds the error of `mean`
+  std::vector<Real> size;          ///< [ray * outputs + o], what margins are relative to; empty: `mean`
   std::string method;              ///< how they were computed
   bool known = true;               ///< false: no mean is known, and `mean` is 0
 };

@@ -5,22 +5,11 @@
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
-#include <limits>
+
+#include "harness/sampling/margins.h"
 
 namespace nullmark {
 namespace {
-
-/// Numbers below have fewer digits than others.
-Real least_of(Precision precision) {
-  return precision == Precision::float64 ? std::numeric_limits<Real>::min() : Real{std::numeric_limits<float>::min()};
-}
-
-/// What single precision may add to a mean: every factor of a weight is off by a few units in its last place, and all of them
-/// may be so to the same side, and numbers below the least normal one have no digits left.
-Real single_error(const Cell& cell, Real mean, Real lookups) {
-  if (cell.precision == Precision::float64) return 0;
-  return 2 * epsilon_of(cell.precision) * std::abs(mean) * (1 + lookups) + least_of(cell.precision);
-}
 
 /// Of epsilon, what rounding may take of a sample.
 constexpr Real kNoBias = 1e-9;
@@ -38,40 +27,11 @@ constexpr std::uint64_t kTellingLookups = 400;
 /// Margin of the groups over that of all rays: as many standard errors as in the pooled test.
 const Real kGroupMargin = std::sqrt(static_cast<Real>(kRayGroups));
 
-/// The relative margin where the configuration names none, wider where depth makes samples noisier.
-Real default_epsilon(Real transmittance) {
-  if (transmittance > std::exp(-2.)) return 0.01;
-  if (transmittance > std::exp(-5.)) return 0.02;
-  return transmittance > 1e-4 ? 0.05 : 0.5;
-}
-
-/// Absolute margin of the scores of a free path, of all flights, and the least of it.
-constexpr Real kOfFlights = 2e-3, kRareScore = 1e-4;
-
-/// Smaller where a score is rare, or nearly always given, or a tracker that never scores it would pass.  A weight's mean is 1.
-Real score_epsilon(const Cell& cell, Real mean) {
-  constexpr Real kOfScore = 0.25, kNever = 1e-9;
-  const Real margin = cell.verdict.epsilon.value_or(kOfFlights), rare = std::min(mean, 1 - mean);
-  return rare < kNever ? margin : std::max(std::min(margin, kOfScore * rare), kRareScore);
-}
-
-/// Absolute margin of an output.  Where hardly anything is absorbed it shrinks with 1 - T, or a tracker that sees no medium at
-/// all would pass.
-Real absolute_epsilon(const Cell& cell, Real mean) {
-  if (cell.quantity == Quantity::free_path) return score_epsilon(cell, mean);
-  // A mean that has underflowed has no part of itself.
-  const Real least = 16 * least_of(cell.precision);
-  if (!(std::abs(mean) > least)) return least;
-  if (cell.verdict.epsilon) return *cell.verdict.epsilon * mean;
-  if (cell.quantity == Quantity::optical_depth || cell.quantity == Quantity::radiance) return 0.01 * std::abs(mean);
-  const Real margin = default_epsilon(mean) * mean, absorbed = 1 - mean;
-  constexpr Real kOfAbsorbed = 0.1;
-  return absorbed > 1e-12 ? std::min(margin, kOfAbsorbed * absorbed) : margin;
-}
-
 /// What the rays of one test have in common.
 struct Pool {
   Real mean = 0, variance = 0, reference_error = 0, least = kInfinity, most = -kInfinity;
+  Real size = 0;  ///< mean of what margins are relative to: the mean itself, or of the samples that a difference is of
+  Real largest = 0;
   std::size_t rays = 0;
 };
 
@@ -125,7 +85,7 @@ class TestPlanner {
               const std::optional<Pilot>& pilot, const TestLevels& levels)
       : cell_(cell), targets_(targets), theory_(theory), pilot_(pilot), levels_(levels), rays_(scene.rays->world.size()) {
     const bool own_mean = claim == Guarantee::consistent || claim == Guarantee::biased;
-    plan_.against = own_mean ? "own mean" : "reference";
+    plan_.against = own_mean ? "own mean" : cell.minus ? "difference" : "reference";
     plan_.group_of = ray_groups(*scene.rays);
     plan_.shift.assign(rays_ * targets.outputs, 0);
     if (own_mean && !theory.ray_shift.empty()) plan_.shift = theory.ray_shift;
@@ -158,6 +118,7 @@ class TestPlanner {
     if (cell_.quantity == Quantity::optical_depth || (!bounding && range != SampleRange::binary)) range = SampleRange::any_sign;
     if (range != SampleRange::any_sign) plan_.low = 0;
     if (range == SampleRange::binary || range == SampleRange::unit) plan_.high = 1;
+    if (cell_.minus && plan_.high == 1) plan_.low = -1;
   }
 
   /// What of a range would help here.
@@ -199,10 +160,12 @@ class TestPlanner {
     std::vector<Pool> pools(rays_ < static_cast<std::size_t>(kRayGroups) ? 1 : 1 + kRayGroups);
     for (std::size_t ray = 0; ray < rays_; ++ray) {
       const std::size_t at = ray * targets_.outputs + output;
-      const Real mean = targets_.mean[at] + plan_.shift[at];
+      const Real mean = targets_.mean[at] + plan_.shift[at], size = targets_.size.empty() ? mean : targets_.size[at];
       const auto add = [&](Pool& pool) {
         ++pool.rays;
         pool.mean += mean;
+        pool.size += size;
+        pool.largest = std::max(pool.largest, std::abs(size));
         pool.variance += analytic_ ? theory_.ray_variance[at] : pilot_ ? pilot_->variance[at] : 0;
         pool.reference_error += targets_.error[at];
         pool.least = std::min(pool.least, mean);
@@ -212,12 +175,14 @@ class TestPlanner {
       if (pools.size() > 1) add(pools[static_cast<std::size_t>(plan_.group_of[ray]) + 1]);
     }
     for (Pool& pool : pools) pool.mean /= static_cast<Real>(pool.rays);
+    for (Pool& pool : pools) pool.size /= static_cast<Real>(pool.rays);
     return pools;
   }
 
   void add_means(std::size_t output) {
     const std::vector<Pool> pools = this->pools(output);
-    const Real epsilon = absolute_epsilon(cell_, pools[0].mean);
+    // Two trackers that are within epsilon of the truth are within twice that of each other.
+    const Real epsilon = absolute_epsilon(cell_, pools[0].size) * (cell_.minus ? 2 : 1);
     for (std::size_t g = 0; g < pools.size(); ++g) {
       const Pool& pool = pools[g];
       const auto n = static_cast<Real>(pool.rays);
@@ -227,19 +192,18 @@ class TestPlanner {
       test.rays = pool.rays;
       test.reference = pool.mean;
       test.epsilon = g == 0 ? epsilon : epsilon * kGroupMargin;
-      test.reference_error = pool.reference_error / n + single_error(cell_, pool.mean, mean_lookups_);
+      test.reference_error = pool.reference_error / n + single_error(cell_, pool.size, mean_lookups_);
       test.variance = pool.variance / n;
       // A few hundred samples of one group may lack the rare events that its variance is made of; those of all rays have them.
       if (!analytic_) test.variance = std::max(test.variance, pools[0].variance / static_cast<Real>(pools[0].rays));
-      const Real depth = pool.mean > 0 ? std::abs(std::log(pool.mean)) : 0, ulp = epsilon_of(cell_.precision);
-      test.rounding = std::max(64 * ulp * (1 + mean_lookups_ + depth) * std::max(std::abs(pool.most), std::abs(pool.least)),
-                               least_of(cell_.precision));
+      const Real depth = pool.size > 0 ? std::abs(std::log(pool.size)) : 0, ulp = epsilon_of(cell_.precision);
+      test.rounding = std::max(64 * ulp * (1 + mean_lookups_ + depth) * pool.largest, least_of(cell_.precision));
       // Trackers that divide by the chance of a rare event enlarge rounding; a billionth of epsilon is no bias.
       test.rounding = std::max(test.rounding, kNoBias * test.epsilon);
       // Rare events that a pilot did not see are no proof of a zero variance.
       test.deterministic =
           exact_ || (analytic_ && !may_be_killed(pool) && !(test.variance > kSurely * test.rounding * test.rounding));
-      if (!analytic_ && !(test.variance > 0)) test.variance = std::max<Real>(pool.mean * (1 - pool.mean), 1e-300);
+      if (!analytic_ && !(test.variance > 0)) test.variance = std::max<Real>(pool.size * (1 - pool.size), 1e-300);
       // Far below epsilon a variance decides nothing, and theory's may be rounding.
       if (!test.deterministic) test.variance = std::max(test.variance, test.epsilon * test.epsilon / 4);
       place(test, {pool.most - plan_.low, plan_.high - pool.least, test.variance, basis(), test.reference_error});
@@ -280,7 +244,7 @@ class TestPlanner {
     if (test.sure <= sure_) return;
     sure_ = test.sure;
     // Relative to a mean that has underflowed nothing can be said.
-    const Real mean = std::max(std::abs(pool.mean), least_of(cell_.precision));
+    const Real mean = std::max(std::abs(pool.size), least_of(cell_.precision));
     needs_ = fmt::format("not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} (relative variance {:.2g})",
                          plan_.affordable, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
     tight_ = fmt::format(

@@ -57,7 +57,7 @@ struct TestPlan {
       shift;  ///< [ray * outputs + o], the claimed mean minus the reference, for estimators judged by their own mean
   std::vector<Real> lookups;                ///< per ray, expected; empty where unknown
   Real low = -kInfinity, high = kInfinity;  ///< the declared range of samples
-  std::string against;                      ///< "reference" or "own mean"
+  std::string against;                      ///< see VerdictRecord
   std::string variance_basis;               ///< "analytic", "pilot" or "none"
   std::uint64_t longest_sum = 1;            ///< rounds of samples are multiples of this: a power of two, 1 to 64
   std::uint64_t planned = 0;                ///< samples per ray, of the most demanding test of the mean

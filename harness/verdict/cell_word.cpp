@@ -67,10 +67,13 @@ Kind kind_of(const CellRecord& record) {
   if (!record.verdict) return Kind::unclaimed;
   const VerdictRecord& verdict = *record.verdict;
   const Outcome mean = mean_of(verdict);
+  const bool pair = record.cell.minus.has_value();
+  if (pair && mean == Outcome::fail) return Kind::differ;
   if (mean == Outcome::fail || verdict.lookups == Outcome::fail || verdict.lawful == Outcome::fail) return Kind::fail;
   if (mean == Outcome::violated) return Kind::violated;
   if (mean == Outcome::inconclusive) return verdict.planned_undecidable ? Kind::expected_open : Kind::unexpected_open;
-  return mean == Outcome::pass ? Kind::pass : Kind::unclaimed;
+  if (mean != Outcome::pass) return Kind::unclaimed;
+  return pair ? Kind::agree : Kind::pass;
 }
 
 std::vector<Mark> marks_of(const CellRecord& record) {
@@ -135,6 +138,10 @@ const char* verdict_word(Kind kind) {
       return "PASS";
     case Kind::fail:
       return "FAIL";
+    case Kind::agree:
+      return "AGREE";
+    case Kind::differ:
+      return "DIFFER";
     case Kind::expected_open:
       return "INCONCLUSIVE (as planned)";
     case Kind::unexpected_open:
@@ -177,7 +184,8 @@ std::string reason_of(const CellRecord& record) {
 }
 
 std::string finding_of(const CellRecord& record) {
-  return kind_of(record) == Kind::pass ? record.verdict->proves : reason_of(record);
+  const Kind kind = kind_of(record);
+  return kind == Kind::pass || kind == Kind::agree ? record.verdict->proves : reason_of(record);
 }
 
 }  // namespace nullmark

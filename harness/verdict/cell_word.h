@@ -7,8 +7,9 @@
 
 namespace nullmark {
 
-/// The kind of a cell in the totals of `check`.
-enum class Kind { pass, fail, expected_open, unexpected_open, violated, error, not_run, unclaimed };
+/// The kind of a cell in the totals of `check`.  `agree` and `differ` are what `pass` and `fail` are called of the difference of
+/// two trackers: two that are biased alike agree.
+enum class Kind { pass, fail, agree, differ, expected_open, unexpected_open, violated, error, not_run, unclaimed };
 Kind kind_of(const CellRecord& record);
 
 /// The outcome of the mean, judged against the reference or the own mean.

@@ -56,6 +56,17 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSam
   return pilot;
 }
 
+/// Means per ray and output of the tracker that a difference subtracts: what its margins are relative to.
+std::vector<Real> means_of_subtracted(const PreparedCell& prepared, const std::function<bool()>& stop) {
+  const auto sampled =
+      sample_cell(prepared.planned(), *prepared.scene, *prepared.subtracted, prepared.targets,
+                  {.first = first_sample::kPilot, .per_ray = prepared.samples_per_ray}, nullptr, stop, [](double) {});
+  std::vector<Real> means;
+  if (!sampled) return means;
+  for (const Moments& moments : sampled->moments) means.push_back(moments.mean());
+  return means;
+}
+
 /// Laws of how the cell's samples and walks behave, where its configuration asks for them; and what of them is not tested.
 std::vector<LawRecord> laws_of(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,
                                std::span<const KeptSamples> kept, std::vector<std::string>& untested,
@@ -253,8 +264,9 @@ std::optional<TestPlan> tests_of(const PreparedCell& prepared, const TestLevels&
   std::optional<Pilot> pilot;
   const bool exact = prepared.claim == Guarantee::exact;
   if ((prepared.theory.ray_variance.empty() && !exact) || spread_missing) pilot = run_pilot(prepared, kept, stop);
-  return plan_tests(prepared.planned(), *prepared.scene, prepared.targets, prepared.range, prepared.claim, prepared.theory, pilot,
-                    levels);
+  Targets targets = prepared.targets;
+  if (prepared.subtracted) targets.size = means_of_subtracted(prepared, stop);
+  return plan_tests(prepared.planned(), *prepared.scene, targets, prepared.range, prepared.claim, prepared.theory, pilot, levels);
 }
 
 std::optional<VerdictRecord> judge(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,

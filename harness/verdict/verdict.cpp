@@ -47,6 +47,9 @@ std::string failure(const TestRecord& test, const Proof& proof, Real alpha, cons
     return fmt::format("a sample is off by {:.3g}, rounding allows {:.3g}; {}", test.largest_error,
                        test.rounding + test.reference_error, measured_bias(test));
   const Real needed = -std::log(alpha);
+  if (verdict.against == "difference")
+    return fmt::format("the means differ by {:+.3g}, proven (log E {:.1f} > {:.1f})", test.mean_error,
+                       std::max(test.log_e_fail, test.log_e_beyond), needed);
   if (rests_on_a_false_variance(test, verdict))
     return fmt::format(
         "{}; no bias is proven: the evidence (log E {:.1f} > {:.1f}) rests on the stated variance, which is too small",
@@ -142,7 +145,10 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
     outcome = Outcome::pass;
     verdict.reason.clear();
     // A mean that the tracker predicts of itself may be biased as it says.
-    verdict.proves = within_text(found.within, verdict.against == "own mean" ? "|mean - own mean|" : "|bias|");
+    const char* error = verdict.against == "own mean"     ? "|mean - own mean|"
+                        : verdict.against == "difference" ? "|difference of the means|"
+                                                          : "|bias|";
+    verdict.proves = within_text(found.within, error);
     if (found.slightly) verdict.proves += fmt::format("; biased by less: {}", measured_bias(*found.slightly));
   }
 }
