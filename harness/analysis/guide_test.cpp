@@ -1,6 +1,7 @@
 // The committed results of configs/claims: the guide rests on them, and they come out again.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -12,6 +13,7 @@
 #include "harness/config/config.h"
 #include "harness/io/file_io.h"
 #include "harness/io/results_json.h"
+#include "harness/model/metrics.h"
 #include "harness/testing/run_untimed.h"
 
 namespace nullmark {
@@ -84,6 +86,36 @@ TEST(Guide, EveryRowOfTheSeedsNamesWhatShowsIt) {
 TEST(Guide, TheCommittedResultsAreThoseOfTheConfigurations) {
   const Plan plan = read_configs(load_configs({in_tree("configs/claims")}));
   EXPECT_EQ(committed().config_text, Json::parse(plan.config_text).dump());
+}
+
+/// A figure of both kernels, own / general, with three digits.
+std::string both(const std::vector<const CellRecord*>& kernels, const char* name) {
+  std::vector<std::string> texts;
+  for (const CellRecord* record : kernels) {
+    const Real value = metric(*record, name).value();
+    texts.push_back(fmt::format("{:.{}f}", value, value >= 100 ? 0 : value >= 10 ? 1 : 2));
+  }
+  return fmt::format("{}", fmt::join(texts, " / "));
+}
+
+/// `scripts/reference effects` makes the results; this test prints the rows that the page lacks.
+TEST(Guide, TheTableOfEffectsIsThatOfTheCommittedResults) {
+  const std::string file = in_tree("results/effects.json.gz"), page = read_file(in_tree("harness/kernel/light.md"));
+  const RunRecord run = read_results(read_file(file), file);
+  std::map<std::string, std::vector<const CellRecord*>> kernels;  // own, general
+  for (const CellRecord& record : run.cells) {
+    auto& pair = kernels[record.cell.experiment];
+    pair.insert(record.cell.transport.general ? pair.end() : pair.begin(), &record);
+  }
+  for (const auto& [experiment, pair] : kernels) {
+    const std::string row =
+        fmt::format("| `{}` | {} | {} | {} | {} |", experiment, both(pair, "ns_per_sample"), both(pair, "variance_x_ns"),
+                    both(pair, "lookups_per_sample"), both(pair, "draws_per_sample"));
+    EXPECT_NE(page.find(row), std::string::npos) << row;
+  }
+  EXPECT_EQ(kernels.size(), 10u);
+  const Plan plan = read_configs(load_configs({in_tree("configs/effects.json")}));
+  EXPECT_EQ(run.config_text, Json::parse(plan.config_text).dump());
 }
 
 /// Cheap ones: the rest takes minutes.

@@ -17,8 +17,8 @@ class HandWalked {
   using MediumRay = typename detail::RayDataOf<E, Value>::type;
 
   struct Outcome {
-    Event<Value> event;
-    Value result;
+    Event<Value> event{};
+    Value result{};
     Real lookups = 0;
   };
 
