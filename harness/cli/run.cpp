@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -16,6 +15,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/cli/process.h"
+#include "harness/cli/shard.h"
 #include "harness/cli/signals.h"
 #include "harness/cli/watched_run.h"
 #include "harness/config/config.h"
@@ -39,14 +39,6 @@
 namespace nullmark {
 namespace {
 
-template <class Number>
-std::optional<Number> parsed(std::string_view text) {
-  Number number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
-
 std::optional<std::uint64_t> requested_seed(const std::string& text) {
   if (text.empty()) return std::nullopt;
   if (text == "random") {
@@ -55,24 +47,9 @@ std::optional<std::uint64_t> requested_seed(const std::string& text) {
     notice("nullmark: seed {}\n", seed);
     return seed;
   }
-  const auto seed = parsed<std::uint64_t>(text);
+  const auto seed = whole_number(text);
   if (!seed) throw InputError(fmt::format("--seed: found \"{}\"; expected a whole number >= 0 or \"random\"", text));
   return seed;
-}
-
-struct Shard {
-  std::size_t index = 0, count = 1;
-};
-
-Shard requested_shard(const std::string& text) {
-  if (text.empty()) return {};
-  const std::size_t slash = text.find('/');
-  if (slash != std::string::npos) {
-    const auto index = parsed<std::size_t>(std::string_view(text).substr(0, slash));
-    const auto count = parsed<std::size_t>(std::string_view(text).substr(slash + 1));
-    if (index && count && *index >= 1 && *index <= *count) return {*index - 1, *count};
-  }
-  throw InputError(fmt::format("--shard: found \"{}\"; expected K/N with 1 <= K <= N, as in 2/4", text));
 }
 
 /// The cells of a plan that `--filter` and `--covering` pick.
@@ -94,19 +71,19 @@ std::vector<bool> filtered(const Plan& plan, const RunCommand& command) {
 }
 
 /// Those of the wanted cells that are of the shard.
-std::vector<bool> of_shard(const std::vector<bool>& wanted, const RunCommand& command) {
-  const Shard shard = requested_shard(command.shard);
+std::vector<bool> of_shard(const std::vector<bool>& wanted, const Shard& shard) {
   std::vector<bool> selected = wanted;
   for (std::size_t i = 0; i < selected.size(); ++i) selected[i] = wanted[i] && i % shard.count == shard.index;
   return selected;
 }
 
-std::string default_output(const std::string& config) {
-  if (config == "-") return "stdin.results.json";
-  std::filesystem::path path(config);
+/// Tasks of a scheduler run in one folder, so a shard's results are named after it: "c.2-of-4.results.json".
+std::string default_output(const std::string& config, const Shard& shard) {
+  std::filesystem::path path(config == "-" ? "stdin" : config);
   if (!path.has_filename()) path = path.parent_path();
   const bool file = path.extension() == ".json";
-  return (file ? path.stem() : path.filename()).string() + ".results.json";
+  const std::string part = shard.count > 1 ? fmt::format(".{}-of-{}", shard.index + 1, shard.count) : "";
+  return (file ? path.stem() : path.filename()).string() + part + ".results.json";
 }
 
 std::string percent(double fraction) { return fmt::format("{:.2g} %", 100 * fraction); }
@@ -197,12 +174,12 @@ std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vect
   return journal;
 }
 
-RunContext context_of(const RunCommand& command, const Plan& plan) {
+RunContext context_of(const RunCommand& command, const Plan& plan, const Shard& shard) {
   RunContext context;
   context.command_line = command.command_line;
   context.filter = command.filter;
   context.covering = command.covering;
-  context.shard = command.shard;
+  if (!command.shard.empty()) context.shard = shard.text();
   context.threads = command.threads > 0 ? command.threads : static_cast<int>(std::thread::hardware_concurrency());
   std::set<std::uint64_t> seeds;
   for (const Cell& cell : plan.cells) seeds.insert(cell.seed);
@@ -276,7 +253,8 @@ ExitCode run_command(const RunCommand& command) {
   const std::vector<ConfigSource> sources = load_configs(command.configs);
   const std::optional<std::uint64_t> seed = requested_seed(command.seed);
   const Plan plan = read_configs(sources, seed);
-  const std::vector<bool> wanted = filtered(plan, command), selected = of_shard(wanted, command);
+  const Shard shard = requested_shard(command.shard);
+  const std::vector<bool> wanted = filtered(plan, command), selected = of_shard(wanted, shard);
   const auto count = static_cast<std::size_t>(std::count(selected.begin(), selected.end(), true));
   if (count == 0) {
     notice("nullmark: nothing selected: none of {} cells passes --filter, --covering and --shard\n", plan.cells.size());
@@ -287,14 +265,14 @@ ExitCode run_command(const RunCommand& command) {
   if (command.dry_run) return dry_run(plan, selected, !command.no_timing);
 
   const bool to_stdout = command.output == "-";
-  const std::string output = command.output.empty() ? default_output(command.configs.front()) : command.output;
+  const std::string output = command.output.empty() ? default_output(command.configs.front(), shard) : command.output;
   std::unique_ptr<Journal> journal;
   Earlier earlier;
   if (!to_stdout) {
     journal = open_journal(command, sources, plan, output);
     if (command.resume) earlier = earlier_results(plan, output, *journal, builds_of(command.builds));
   }
-  RunContext context = context_of(command, plan);
+  RunContext context = context_of(command, plan, shard);
   const RunOptions options = options_of(command, to_stdout ? "" : output);
 
   // What was there before was selected then.

@@ -28,7 +28,7 @@ void declare_run(CLI::App& command, RunCommand& asked) {
   command.add_option("--filter", asked.filter, "Run only cells whose name matches this regular expression");
   command.add_flag("--covering", asked.covering,
                    "Run a subset in which every pair of estimator, medium, depth and majorant occurs");
-  command.add_option("--shard", asked.shard, "Run only part K of N: K/N");
+  command.add_option("--shard", asked.shard, "Run only part K of N: K/N, or auto for the task of a scheduler");
   command.add_flag("--resume", asked.resume, "Continue from the existing results and journal");
   command.add_option("--builds", asked.builds, kBuilds)->needs("--resume");
   command.add_flag("--force", asked.force, "Replace existing results")->excludes("--resume");
