@@ -72,10 +72,12 @@ TEST(Summary, JunitAndMarkdownTellEveryEndOfACell) {
                           judged(verdict_of({passing(), failing(-1)})), judged(own)});
   const char* names[] = {"good", "a<b & \"c\"", "open", "costly", "violating"};
   for (std::size_t i = 0; i < run.cells.size(); ++i) run.cells[i].cell.name = names[i];
+  run.cells[1].time.emplace().ns_per_sample = 500;
+  run.cells[1].samples = 1'000'000;
   const Summary summary = summarise(run);
   const std::string xml = junit(run, "it's.json");
   EXPECT_NE(xml.find(R"(tests="5" failures="2" errors="0" skipped="2")"), std::string::npos) << xml;
-  EXPECT_NE(xml.find(R"(name="a&lt;b &amp; &quot;c&quot;">)"), std::string::npos) << xml;
+  EXPECT_NE(xml.find(R"(name="a&lt;b &amp; &quot;c&quot;" time="0.500">)"), std::string::npos) << xml;
   EXPECT_NE(xml.find("<failure message=\"FAIL: mean 0, expected 0: +0; biased, proven (log E 100.0 &gt; 9.2)"), std::string::npos)
       << xml;
   EXPECT_NE(xml.find("<failure message=\"FAIL: lookups"), std::string::npos) << xml;

@@ -4,10 +4,18 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 
 #include "harness/io/json_input.h"
 
 namespace nullmark {
+
+std::optional<std::uint64_t> whole_number(std::string_view text) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
 
 std::string short_number(const std::optional<Real>& number) { return number ? fmt::format("{:.4g}", *number) : "-"; }
 
@@ -125,6 +133,40 @@ std::string markdown_table(const std::vector<std::vector<std::string>>& lines) {
     text += "|\n";
   }
   return text;
+}
+
+std::string latex(const std::string& text) {
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (text.compare(i, 2, "±") == 0) {
+      result += "$\\pm$";
+      ++i;
+    } else if (std::string_view("#$%&_{}").find(c) != std::string_view::npos) {
+      result += {'\\', c};
+    } else if (c == '\\' || c == '~' || c == '^') {
+      result += c == '\\' ? "\\textbackslash{}" : c == '~' ? "\\textasciitilde{}" : "\\textasciicircum{}";
+    } else if (c == '<' || c == '>' || c == '|') {
+      result += fmt::format("${}$", c);
+    } else if (static_cast<unsigned char>(c) < 0x80) {
+      result += c;
+    } else if ((static_cast<unsigned char>(c) & 0xc0) != 0x80) {
+      result += '?';
+    }
+  }
+  return result;
+}
+
+std::string latex_table(const std::vector<std::vector<std::string>>& lines, std::size_t left, const std::string& caption) {
+  const std::size_t columns = lines.at(0).size();
+  std::string text =
+      fmt::format("\\begin{{table}}\n\\centering\n\\caption{{{}}}\n\\begin{{tabular}}{{{}{}}}\n\\toprule\n", latex(caption),
+                  std::string(std::min(left, columns), 'l'), std::string(columns - std::min(left, columns), 'r'));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    for (std::size_t c = 0; c < lines[i].size(); ++c) text += (c > 0 ? " & " : "") + latex(lines[i][c]);
+    text += i == 0 ? " \\\\\n\\midrule\n" : " \\\\\n";
+  }
+  return text + "\\bottomrule\n\\end{tabular}\n\\end{table}\n";
 }
 
 namespace {

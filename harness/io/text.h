@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,6 +17,12 @@ std::string aligned(const std::vector<std::vector<std::string>>& lines, std::siz
 /// The same as a markdown table.
 std::string markdown_table(const std::vector<std::vector<std::string>>& lines);
 
+/// Text as LaTeX prints it: what it would read is escaped, letters beyond ASCII are question marks.
+std::string latex(const std::string& text);
+
+/// Such lines as a LaTeX table of the package booktabs, with a caption; the first `left` columns are left-aligned.
+std::string latex_table(const std::vector<std::vector<std::string>>& lines, std::size_t left, const std::string& caption);
+
 /// Text for a cell of a markdown table, or for a line: no cell ends in it and no HTML begins.
 std::string markdown_cell(const std::string& text);
 
@@ -31,6 +38,9 @@ std::string printable(std::string_view text);
 
 /// A message: one line of plain text.  Of more than 2000 bytes, as where it quotes a long name, the middle is left out.
 std::string one_line(std::string_view text);
+
+/// The whole number >= 0 that a text is; none where it is another or too large.
+std::optional<std::uint64_t> whole_number(std::string_view text);
 
 /// Four significant digits, or "-" if there is no number.
 std::string short_number(const std::optional<Real>& number);

@@ -49,6 +49,13 @@ TEST(Text, MarkdownKeepsItsTablesAndBeginsNoHtml) {
   EXPECT_EQ(markdown_code("a `b` ``c``"), "``` a `b` ``c`` ```");
 }
 
+TEST(Text, LatexTablesEscapeWhatLatexReads) {
+  EXPECT_EQ(latex_table({{"a_b", "50 %"}, {"x<y^2", "1 \xc2\xb1 2"}}, 1, "c#1"),
+            "\\begin{table}\n\\centering\n\\caption{c\\#1}\n\\begin{tabular}{lr}\n\\toprule\n"
+            "a\\_b & 50 \\% \\\\\n\\midrule\nx$<$y\\textasciicircum{}2 & 1 $\\pm$ 2 \\\\\n"
+            "\\bottomrule\n\\end{tabular}\n\\end{table}\n");
+}
+
 TEST(Text, XmlHoldsOnlyItsCharacters) {
   EXPECT_EQ(xml("a<b>&\"c\"\x1b"), "a&lt;b&gt;&amp;&quot;c&quot;\\x1b");
   EXPECT_EQ(xml("\xef\xbf\xbe|\xef\xbf\xbf|\xef\xbf\xbd"), "\xef\xbf\xbd|\xef\xbf\xbd|\xef\xbf\xbd");

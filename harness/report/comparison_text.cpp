@@ -176,6 +176,21 @@ std::string compare_text(const std::vector<RunRecord>& runs, const std::string& 
   return text;
 }
 
+std::string compare_latex(const std::vector<RunRecord>& runs, const std::string& baseline) {
+  std::string text =
+      fmt::format("{}: tables for \\usepackage{{booktabs}}; \\pm and brackets are intervals of 95 %\n", kLatexBeginning);
+  for (const Comparison& comparison : comparisons(runs, baseline)) {
+    std::vector<std::string> notes = {amortised_line(comparison), unproven_line(comparison), baseline_line(comparison) + "\n"};
+    std::string caption = comparison.name;
+    for (const std::string& note : notes)
+      if (!note.empty()) caption += "; " + note.substr(0, note.size() - 1);
+    text += latex_table(ranking(comparison), 3, caption);
+  }
+  for (const RunRecord& run : runs)
+    for (const auto& [title, lines] : configured_tables(run)) text += latex_table(lines, 1, title);
+  return text;
+}
+
 std::string compare_markdown(const std::vector<RunRecord>& runs, const std::string& baseline, bool paired) {
   std::string text = "### nullmark compare\n\n";
   for (const Comparison& comparison : comparisons(runs, baseline)) {

@@ -12,6 +12,11 @@ namespace nullmark {
 /// squared errors on common streams.  Empty if no cell was sampled.  Throws InputError if the results hold no such baseline.
 std::string compare_text(const std::vector<RunRecord>& runs, const std::string& baseline, bool paired);
 
+inline constexpr const char* kLatexBeginning = "% nullmark compare";
+
+/// The same as LaTeX tables with captions, for a paper; they need the package booktabs.
+std::string compare_latex(const std::vector<RunRecord>& runs, const std::string& baseline);
+
 /// The same for a pull request.
 std::string compare_markdown(const std::vector<RunRecord>& runs, const std::string& baseline, bool paired);
 

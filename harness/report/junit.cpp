@@ -42,6 +42,12 @@ Ending ending(const CellRecord& record) {
   return {"skipped", says()};
 }
 
+/// Seconds of one thread that the cell's samples take, where a sample was timed.
+std::string sampling_time(const CellRecord& record) {
+  if (!record.time) return "";
+  return fmt::format(" time=\"{:.3f}\"", record.time->ns_per_sample * static_cast<Real>(record.samples) * 1e-9);
+}
+
 }  // namespace
 
 std::string reproduction(const CellRecord& record, const std::string& file) {
@@ -59,7 +65,8 @@ std::string junit(const RunRecord& run, const std::string& file) {
   for (const CellRecord& record : run.cells) {
     const Ending end = ending(record);
     const std::string_view element = end.element;
-    cases += fmt::format("    <testcase classname=\"{}\" name=\"{}\"", xml(record.cell.experiment), xml(record.cell.name));
+    cases += fmt::format("    <testcase classname=\"{}\" name=\"{}\"{}", xml(record.cell.experiment), xml(record.cell.name),
+                         sampling_time(record));
     if (element.empty()) {
       cases += fmt::format(">\n      <system-out>{}</system-out>\n    </testcase>\n", xml(end.message));
       continue;

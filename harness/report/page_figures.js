@@ -23,7 +23,7 @@ function convergencePaper() {
   const view = usefulConvergenceViews()[0]?.[1] ?? convergenceViews.time;
   const name = view === convergenceViews.time ? "error-over-time" : "error-over-lookups";
   const scenes = firstScenes((cell) => stepsOf(cell, view).length > 0);
-  return scenes.map((scene) => ({ name: `${name} ${scene.experiment}`, describe: convergenceFigure(scene, view).describe }));
+  return scenes.map((scene) => ({ name: `${name} ${scene.experiment}`, caption: `${view.title}: ${scene.name}`, describe: convergenceFigure(scene, view).describe }));
 }
 
 function picturesPaper(scene, kind, tilesOf, columns) {
@@ -31,22 +31,22 @@ function picturesPaper(scene, kind, tilesOf, columns) {
   const figures = (cell) => `, RMSE ${cell.rmse.map((x) => formatNumber(x, 3)).join(", ")}`;
   const named = (cell) => (picture) => [shortened(cell.label, 30), picture.title + (picture === imageKinds.mean ? figures(cell) : "")];
   const tiles = () => cells.flatMap((cell) => tilesOf(cell, cells, named(cell)));
-  return { name: `${kind} ${scene.experiment}`, describe: (width, theme) => picturesPlot(tiles(), columns(cells[0]), width, theme) };
+  return { name: `${kind} ${scene.experiment}`, caption: `${kind}: ${scene.name}`, describe: (width, theme) => picturesPlot(tiles(), columns(cells[0]), width, theme) };
 }
 
 function scalingPaper() {
   const view = usefulScalingViews()[0]?.[1] ?? scalingViews.ns_per_sample;
-  return scalingGroups(view).map((group) => ({ name: `scaling ${report.cells[group.series[0].points[0].cell].experiment}`, describe: scalingFigure(group, view).describe }));
+  return scalingGroups(view).map((group) => ({ name: `scaling ${report.cells[group.series[0].points[0].cell].experiment}`, caption: `${view.title} over ${group.axis}: ${group.rest}`, describe: scalingFigure(group, view).describe }));
 }
 
 function paperFigures() {
   const maps = (cell, cells, heading) => mapTiles(cell, cells, scaleChoices.shared_log, heading);
   const withImages = firstScenes(hasImages);
-  const matrix = usefulMatrixViews().slice(0, 1).map(([, view]) => ({ name: "matrix", describe: matrixFigure(view).describe }));
+  const matrix = usefulMatrixViews().slice(0, 1).map(([, view]) => ({ name: "matrix", caption: view.title, describe: matrixFigure(view).describe }));
   return [
-    ...firstScenes(reachesTheError).map((scene) => ({ name: `time-to-error ${scene.experiment}`, describe: timesFigure(scene).describe })),
+    ...firstScenes(reachesTheError).map((scene) => ({ name: `time-to-error ${scene.experiment}`, caption: `Time to an error of 1 %: ${scene.name}`, describe: timesFigure(scene).describe })),
     ...convergencePaper(),
-    ...firstScenes(hasParetoPoint).map((scene) => ({ name: `pareto ${scene.experiment}`, describe: paretoFigure(scene).describe })),
+    ...firstScenes(hasParetoPoint).map((scene) => ({ name: `pareto ${scene.experiment}`, caption: `Variance and time of a sample: ${scene.name}`, describe: paretoFigure(scene).describe })),
     ...matrix,
     ...withImages.map((scene) => picturesPaper(scene, "maps", maps, (cell) => maps(cell, [cell], titleLine).length)),
     ...withImages.map((scene) => picturesPaper(scene, "strips", stripTiles, (cell) => stripTiles(cell, [cell], titleLine).length)),
@@ -54,13 +54,13 @@ function paperFigures() {
   ];
 }
 
-async function drawnForPaper({ describe }, name) {
+async function drawnForPaper({ caption, describe }, name) {
   const { traces, layout } = describe(paperWidth, paperTheme);
   const figure = { data: traces, layout: { ...layout, width: paperWidth, paper_bgcolor: "#ffffff", plot_bgcolor: "#ffffff" } };
   const size = { width: paperWidth, height: layout.height };
   const svg = await Plotly.toImage(figure, { ...size, format: "svg", imageDataOnly: true });
   const png = await Plotly.toImage(figure, { ...size, format: "png", scale: 2, imageDataOnly: true });
-  return { name, svg, png };
+  return { name, caption, svg, png, ...size };
 }
 
 async function writeFigures() {

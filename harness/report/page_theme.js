@@ -21,22 +21,27 @@ const styleOfLabel = new Map();
 /** These look the same in every report that has them. */
 const commonTypes = ["delta", "ratio", "next_flight_delta", "next_flight_ratio", "residual_ratio", "ray_marching", "regular", "residual_delta"];
 
-function typesInOrder(labels) {
-  const known = new Set(labels.map(([, type]) => type));
-  return [...commonTypes, ...[...known].filter((type) => !commonTypes.includes(type)).sort()];
+/** The colour of each type: its own where it is common; the others take those that no type of this report has, while there are any. */
+function coloursOfTypes(labels) {
+  const count = okabeIto.length + 1;
+  const types = [...new Set(labels.map(([, type]) => type))].sort();
+  const colours = new Map(types.filter((type) => commonTypes.includes(type)).map((type) => [type, commonTypes.indexOf(type) % count]));
+  const free = Array.from({ length: count }, (_, i) => i).filter((i) => ![...colours.values()].includes(i));
+  const others = types.filter((type) => !commonTypes.includes(type));
+  others.forEach((type, i) => colours.set(type, i < free.length ? free[i] : (i - free.length) % count));
+  return colours;
 }
 
 /** Types take colours, variants of a type symbols and dashes. */
 function assignStyles() {
   const labels = [...new Map(report.cells.map((cell) => [cell.label, cell.type]))].sort(([a], [b]) => (a < b ? -1 : 1));
-  const types = typesInOrder(labels);
+  const colours = coloursOfTypes(labels);
   const used = new Map();
   for (const [label, type] of labels) {
-    const place = types.indexOf(type);
-    const colour = place % (okabeIto.length + 1);
+    const colour = colours.get(type);
     const look = used.get(colour) ?? 0;
     used.set(colour, look + 1);
-    const [symbol, glyph] = symbols[(look + place) % symbols.length];
+    const [symbol, glyph] = symbols[(look + colour) % symbols.length];
     styleOfLabel.set(label, { colour: okabeIto[colour] ?? null, symbol, glyph, dash: dashes[look % dashes.length] });
   }
 }

@@ -40,6 +40,17 @@ std::vector<Layer> layers(const PreparedCell& prepared, const Sampled& sampled) 
   return all;
 }
 
+/// A cell's name as part of a file's, and enough of its id to be the only one: "ratio-linear-optical_depth-2-global.3f2a91bc".
+std::string file_stem(const Cell& cell) {
+  constexpr std::size_t kLongest = 80, kDigits = 8;
+  std::string stem;
+  for (const char c : cell.name.substr(0, kLongest)) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_';
+    if (plain || (!stem.empty() && stem.back() != '-')) stem += plain ? c : '-';
+  }
+  return fmt::format("{}.{}", stem, cell.id.substr(0, kDigits));
+}
+
 }  // namespace
 
 void write_images(CellRecord& record, const PreparedCell& prepared, const Sampled& sampled, const RunOptions& options,
@@ -71,7 +82,7 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
       return path.string();
     };
     const auto write = [&](const char* kind, const std::vector<Real>& values, std::size_t count, Real maximum) {
-      const std::string file = fmt::format("{}.{}.png", prepared.cell->id, kind);
+      const std::string file = fmt::format("{}.{}.png", file_stem(*prepared.cell), kind);
       write_png(path_of(file), rays.width, rays.height, static_cast<int>(count), values, maximum,
                 prepared.cell->quantity == Quantity::radiance && &values == &mean);
       record.images[kind] = (std::filesystem::path(options.image_prefix) / file).string();
@@ -81,7 +92,7 @@ void write_images(CellRecord& record, const PreparedCell& prepared, const Sample
     write("variance", variance, shown, greatest(variance));
     write("lookups", lookups, 1, greatest(lookups));
     write("null_collisions", null_collisions, 1, greatest(null_collisions));
-    const std::string file = fmt::format("{}.exr", prepared.cell->id);
+    const std::string file = fmt::format("{}.exr", file_stem(*prepared.cell));
     write_exr(path_of(file), rays.width, rays.height, layers(prepared, sampled));
     record.images["layers"] = (std::filesystem::path(options.image_prefix) / file).string();
   } catch (const std::exception& error) {
