@@ -20,6 +20,7 @@ struct JackknifeNormal {
   static constexpr SampleRange kRange = SampleRange::any_sign;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kIgnoresMajorant = true;
+  static constexpr bool kGreyOnly = true;
   static constexpr bool kNeedsOpticalDepth = true;
 
   Real deviation = 0.3;

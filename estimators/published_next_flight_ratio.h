@@ -13,6 +13,7 @@ struct PublishedNextFlightRatioTracking : NextFlightRatioTracking<Value> {
   static constexpr const char* kSummary = "next-flight ratio tracking with the step law of a published comparison (biased)";
   static constexpr const char* kSource = "Kozelj, Comparison of transmittance and distance estimators: program";
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kGreyOnly = true;
   static constexpr bool kLanes = false;
 
   using Walk = typename NextFlightRatioTracking<Value>::Walk;

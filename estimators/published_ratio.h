@@ -19,6 +19,7 @@ struct PublishedRatioTracking {
   static constexpr bool kOwnFlights = true;
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kGreyOnly = true;
 
   Guarantee claim(Quantity) const { return Guarantee::biased; }
 

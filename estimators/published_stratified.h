@@ -14,6 +14,7 @@ struct PublishedStratified {
   static constexpr const char* kSource = "Kozelj, Comparison of transmittance and distance estimators: program";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kGreyOnly = true;
   static constexpr bool kIgnoresMajorant = true;
 
   int steps = 1000;

@@ -20,6 +20,7 @@ struct TelescopingDifference {
   static constexpr SampleRange kRange = SampleRange::any_sign;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kIgnoresMajorant = true;
+  static constexpr bool kGreyOnly = true;
 
   int level = 0;
   std::string marches = "correlated";
