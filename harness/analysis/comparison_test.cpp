@@ -115,7 +115,8 @@ TEST(Cost, FewSamplesCostWhatAsFewCostWhenTheyWereTimed) {
   EXPECT_NEAR(seconds_to(*cost_of(record), 0.01)->value, 120e-9, 1e-18);
   EXPECT_FALSE(is_amortised(*cost_of(record), 0.01));
   record.channel[0].variance_theory = 20 * 0.01 * 0.01 * 0.25;
-  EXPECT_NEAR(seconds_to(*cost_of(record), 0.01)->value, 20 * 30e-9, 1e-15);
+  // Twenty samples between eight of 240 ns together and 64 of 640 ns.
+  EXPECT_NEAR(seconds_to(*cost_of(record), 0.01)->value, (240 + 12 * 400 / 56.) * 1e-9, 1e-15);
   record.channel[0].variance_theory = 0.04;
   EXPECT_NEAR(seconds_to(*cost_of(record), 0.01)->value, 1600 * 10e-9, 1e-15);
 }

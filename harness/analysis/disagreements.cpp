@@ -26,8 +26,10 @@ struct ScenePairs {
 };
 
 std::string scene_of(const CellRecord& record) {
-  return fmt::format("{} on {}, {}, {}, {}, seed {}", record.cell.experiment, record.medium.label, record.majorant.label,
-                     record.ray_set.label, transport_label(record.cell.transport), record.cell.seed);
+  std::string scene =
+      fmt::format("{} on {}, {}, {}", record.cell.experiment, record.medium.label, record.majorant.label, record.ray_set.label);
+  if (const std::string transport = transport_label(record.cell.transport); !transport.empty()) scene += ", " + transport;
+  return fmt::format("{}, seed {}", scene, record.cell.seed);
 }
 
 }  // namespace
@@ -45,8 +47,9 @@ std::vector<std::string> disagreements(const RunRecord& run) {
   for (const auto& [scene, pairs] : scenes)
     for (const auto& [tracker, others] : pairs.differ) {
       if (const auto witnesses = pairs.witnesses_against(tracker)) {
-        sentences.push_back(fmt::format("{}: {} differs from {} and {}, which agree with each other: {} is biased", scene,
-                                        tracker, witnesses->first, witnesses->second, tracker));
+        sentences.push_back(
+            fmt::format("{}: {} differs from {} and {}, which agree with each other: {} is biased, or both of them are", scene,
+                        tracker, witnesses->first, witnesses->second, tracker));
         continue;
       }
       for (const std::string& other : others)

@@ -7,8 +7,8 @@
 
 namespace nullmark {
 
-/// What differing pairs of trackers say, a sentence each.  A pair says that one of the two is biased.  A tracker that differs
-/// from two others which agree with each other in the same scene is the biased one; equal biases of those two would not show.
+/// What differing pairs of trackers say, a sentence each.  A pair says that one of the two is biased.  Where a tracker differs
+/// from two others that agree with each other in the same scene, it is biased, or both of them are: equal biases do not show.
 std::vector<std::string> disagreements(const RunRecord& run);
 
 }  // namespace nullmark

@@ -198,7 +198,7 @@ class CommandLine {
       const std::vector<RunRecord> runs = load_all(files_);
       const std::string ranking = compare_text(runs, baseline_, paired_);
       if (ranking.empty()) {
-        notice("nullmark: no cell of these results was sampled; nothing to compare\n");
+        notice("nullmark: no cell of these results was sampled, or they are pairs, which are not ranked; nothing to compare\n");
         return ExitCode::nothing_ran;
       }
       for (std::size_t i = 0; i < runs.size(); ++i) {

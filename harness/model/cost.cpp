@@ -104,14 +104,28 @@ Interval samples_to(const Cost& cost, Real target) {
           samples(cost.variance.high, floor.high)};
 }
 
+namespace {
+
+/// Nanoseconds of one of n samples that share a walk through the majorant structure.  Between two numbers that were timed, the
+/// time of all of them grows linearly: the walk once, and so much a sample.
+Interval sample_time(const Cost& cost, Real n) {
+  const auto& batches = cost.ns_by_batch;
+  std::size_t next = 0;
+  while (next < batches.size() && static_cast<Real>(batches[next].first) <= n) ++next;
+  if (next == 0 || next == batches.size()) return batches[next == 0 ? 0 : next - 1].second;
+  const auto fewer = static_cast<Real>(batches[next - 1].first), more = static_cast<Real>(batches[next].first);
+  const Real of_fewer = fewer * (more - n) / ((more - fewer) * n), of_more = more * (n - fewer) / ((more - fewer) * n);
+  const Interval &a = batches[next - 1].second, &b = batches[next].second;
+  return {of_fewer * a.value + of_more * b.value, of_fewer * a.low + of_more * b.low, of_fewer * a.high + of_more * b.high};
+}
+
+}  // namespace
+
 std::optional<Interval> seconds_to(const Cost& cost, Real target) {
   if (!cost.ns_per_sample) return std::nullopt;
   const Interval samples = samples_to(cost, target);
   if (!std::isfinite(samples.value)) return samples;
-  const Interval* ns = &cost.ns_by_batch.front().second;
-  for (const auto& [size, time] : cost.ns_by_batch)
-    if (static_cast<Real>(size) <= samples.value) ns = &time;
-  return product(product(samples, *ns), exactly(1e-9));
+  return product(product(samples, sample_time(cost, samples.value)), exactly(1e-9));
 }
 
 bool is_amortised(const Cost& cost, Real target) {

@@ -45,8 +45,9 @@ std::optional<Cost> cost_of(const CellRecord& record);
 /// the target.
 Interval samples_to(const Cost& cost, Real target);
 
-/// Seconds of one ray on one thread until the relative error is `target`.  Uses the time of the largest timed batch that is not
-/// larger than the samples needed.  Infinite if the target is never reached, nothing without a time.
+/// Seconds of one ray on one thread until the relative error is `target`, where the samples needed share a walk through the
+/// majorant structure: interpolated linearly between the numbers of samples that were timed together.  Infinite if the target is
+/// never reached, nothing without a time.
 std::optional<Interval> seconds_to(const Cost& cost, Real target);
 
 /// Whether fewer samples are needed than the smallest timed batch has.  `seconds_to` then leaves out part of the walk through the

@@ -22,7 +22,7 @@ std::string shown(const Interval& x) {
   const Real half = std::max(x.high / x.value - 1, 1 - x.low / x.value);
   if (half < 0.0005) return fmt::format("{:.3g}", x.value);
   return half < 0.5 ? fmt::format("{:.3g} ±{:.2g} %", x.value, 100 * half)
-                    : fmt::format("{:.3g} [{:.2g}, {:.2g}]", x.value, x.low, x.high);
+                    : fmt::format("{:.3g} [{:.3g}, {:.3g}]", x.value, x.low, x.high);
 }
 std::string shown(const std::optional<Interval>& x) { return x ? shown(*x) : "-"; }
 

@@ -113,6 +113,7 @@ Row csv_row(const CellRecord& record, std::size_t c) {
           {"name", cell.name},
           {"experiment", cell.experiment},
           {"estimator", cell.estimator.label},
+          {"minus", cell.minus ? cell.minus->label : ""},
           {"medium", record.medium.label},
           {"majorant", record.majorant.label},
           {"ray_set", record.ray_set.label},
