@@ -93,12 +93,13 @@ TEST(Configs, Seed003RelationsAreMet) {
   for (const char* name : {"seed_003_decomposition.json", "seed_003_optimal.json"}) {
     Plan plan = shipped(name);
     for (Cell& cell : plan.cells) cell.verdict.enabled = false;
-    expect_claims(plan, run_untimed(plan));
+    const std::set<std::string> unclaimed = {"escape", "over_the_control", "super_voxels"};
+    expect_claims(plan, run_untimed(plan, [&](const Cell& cell) { return !unclaimed.contains(cell.experiment); }));
   }
 }
 
-/// Kozelj's Table 1: corrected within 2 % of theory, as published within 4 % of the printed values.  Pictures have a quarter of their
-/// pixels here, which leaves their errors what they are (claims C08 and C09 have all of them).
+/// Kozelj's Table 1: corrected within 2 % of theory, as published within 4 % of the printed values.  Pictures have a quarter of
+/// their pixels here, which leaves their errors what they are (claims C08 and C09 have all of them).
 TEST(Configs, Seed004TableIsReproducedAndCorrected) {
   Plan plan = shipped("seed_004_table1.json");
   for (Component& rays : plan.ray_sets) rays.values["width"] = rays.values["height"] = std::get<int>(rays.values.at("width")) / 2;
