@@ -214,7 +214,7 @@ class CommandLine {
     command->add_option("--baseline", baseline_, "Estimator to compare the others with");
     command->add_flag("--paired", paired_, "Also compare mean squared errors on common random streams");
     command->add_option("--markdown", markdown_, "Also write the tables for a pull request");
-    command->add_option("--latex", latex_, "Also write the tables for a paper (LaTeX, package booktabs)");
+    command->add_option("--latex", latex_, "Also write the tables for a paper (LaTeX, packages booktabs and graphicx)");
   }
 
   void add_gate() {

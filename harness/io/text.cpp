@@ -159,14 +159,16 @@ std::string latex(const std::string& text) {
 
 std::string latex_table(const std::vector<std::vector<std::string>>& lines, std::size_t left, const std::string& caption) {
   const std::size_t columns = lines.at(0).size();
-  std::string text =
-      fmt::format("\\begin{{table}}\n\\centering\n\\caption{{{}}}\n\\begin{{tabular}}{{{}{}}}\n\\toprule\n", latex(caption),
-                  std::string(std::min(left, columns), 'l'), std::string(columns - std::min(left, columns), 'r'));
+  // As wide as the text, whatever the columns need.
+  std::string text = fmt::format(
+      "\\begin{{table}}\n\\centering\n\\caption{{{}}}\n\\resizebox{{\\linewidth}}{{!}}{{%\n\\begin{{tabular}}{{{}{}}}"
+      "\n\\toprule\n",
+      latex(caption), std::string(std::min(left, columns), 'l'), std::string(columns - std::min(left, columns), 'r'));
   for (std::size_t i = 0; i < lines.size(); ++i) {
     for (std::size_t c = 0; c < lines[i].size(); ++c) text += (c > 0 ? " & " : "") + latex(lines[i][c]);
     text += i == 0 ? " \\\\\n\\midrule\n" : " \\\\\n";
   }
-  return text + "\\bottomrule\n\\end{tabular}\n\\end{table}\n";
+  return text + "\\bottomrule\n\\end{tabular}}\n\\end{table}\n";
 }
 
 namespace {

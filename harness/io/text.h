@@ -20,7 +20,7 @@ std::string markdown_table(const std::vector<std::vector<std::string>>& lines);
 /// Text as LaTeX prints it: what it would read is escaped, letters beyond ASCII are question marks.
 std::string latex(const std::string& text);
 
-/// Such lines as a LaTeX table of the package booktabs, with a caption; the first `left` columns are left-aligned.
+/// Such lines as a LaTeX table of the packages booktabs and graphicx, with a caption; the first `left` columns are left-aligned.
 std::string latex_table(const std::vector<std::vector<std::string>>& lines, std::size_t left, const std::string& caption);
 
 /// Text for a cell of a markdown table, or for a line: no cell ends in it and no HTML begins.

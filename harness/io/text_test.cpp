@@ -51,9 +51,9 @@ TEST(Text, MarkdownKeepsItsTablesAndBeginsNoHtml) {
 
 TEST(Text, LatexTablesEscapeWhatLatexReads) {
   EXPECT_EQ(latex_table({{"a_b", "50 %"}, {"x<y^2", "1 \xc2\xb1 2"}}, 1, "c#1"),
-            "\\begin{table}\n\\centering\n\\caption{c\\#1}\n\\begin{tabular}{lr}\n\\toprule\n"
+            "\\begin{table}\n\\centering\n\\caption{c\\#1}\n\\resizebox{\\linewidth}{!}{%\n\\begin{tabular}{lr}\n\\toprule\n"
             "a\\_b & 50 \\% \\\\\n\\midrule\nx$<$y\\textasciicircum{}2 & 1 $\\pm$ 2 \\\\\n"
-            "\\bottomrule\n\\end{tabular}\n\\end{table}\n");
+            "\\bottomrule\n\\end{tabular}}\n\\end{table}\n");
 }
 
 TEST(Text, XmlHoldsOnlyItsCharacters) {

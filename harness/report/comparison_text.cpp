@@ -84,6 +84,17 @@ std::vector<Line> ranking(const Comparison& comparison) {
   return lines;
 }
 
+/// The columns of a ranking that a page of paper has room for.
+std::vector<Line> for_a_page(const std::vector<Line>& whole) {
+  const std::vector<std::string> kept = {"", "estimator", "verdict", "variance", "s to 1 %", "/ baseline", "floor"};
+  std::vector<Line> lines(whole.size());
+  for (std::size_t c = 0; c < whole[0].size(); ++c) {
+    if (std::find(kept.begin(), kept.end(), whole[0][c]) == kept.end()) continue;
+    for (std::size_t i = 0; i < whole.size(); ++i) lines[i].push_back(whole[i][c]);
+  }
+  return lines;
+}
+
 /// The interval alone, of a number that stands beside it.
 std::string ends_shown(const Interval& x) { return fmt::format("[{:.3g}, {:.3g}]", x.low, x.high); }
 
@@ -178,13 +189,13 @@ std::string compare_text(const std::vector<RunRecord>& runs, const std::string& 
 
 std::string compare_latex(const std::vector<RunRecord>& runs, const std::string& baseline) {
   std::string text =
-      fmt::format("{}: tables for \\usepackage{{booktabs}}; \\pm and brackets are intervals of 95 %\n", kLatexBeginning);
+      fmt::format("{}: tables for \\usepackage{{booktabs,graphicx}}; \\pm and brackets are intervals of 95 %\n", kLatexBeginning);
   for (const Comparison& comparison : comparisons(runs, baseline)) {
     std::vector<std::string> notes = {amortised_line(comparison), unproven_line(comparison), baseline_line(comparison) + "\n"};
     std::string caption = comparison.name;
     for (const std::string& note : notes)
       if (!note.empty()) caption += "; " + note.substr(0, note.size() - 1);
-    text += latex_table(ranking(comparison), 3, caption);
+    text += latex_table(for_a_page(ranking(comparison)), 3, caption);
   }
   for (const RunRecord& run : runs)
     for (const auto& [title, lines] : configured_tables(run)) text += latex_table(lines, 1, title);

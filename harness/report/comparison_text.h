@@ -14,7 +14,7 @@ std::string compare_text(const std::vector<RunRecord>& runs, const std::string& 
 
 inline constexpr const char* kLatexBeginning = "% nullmark compare";
 
-/// The same as LaTeX tables with captions, for a paper; they need the package booktabs.
+/// The same as LaTeX tables with captions, for a paper; they need the packages booktabs and graphicx.
 std::string compare_latex(const std::vector<RunRecord>& runs, const std::string& baseline);
 
 /// The same for a pull request.
