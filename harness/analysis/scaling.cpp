@@ -87,13 +87,8 @@ std::optional<Interval> power_law(const std::vector<std::pair<Real, Real>>& poin
 
 std::optional<Real> scaled_variance(const CellRecord& record) {
   if (record.outputs.empty()) return metric(record, "relative_variance");
-  Real sum = 0;
-  const auto channels = static_cast<std::size_t>(record.channels);
-  for (std::size_t o = record.channel.size() - channels; o < record.channel.size(); ++o) {
-    if (!record.channel[o].relative_variance) return std::nullopt;
-    sum += *record.channel[o].relative_variance;
-  }
-  return sum / static_cast<Real>(channels);
+  const std::optional<Real> theory = metric_theory(record, "weight_variance");
+  return theory ? theory : metric(record, "weight_variance");
 }
 
 std::vector<ScalingSeries> scaling_series(const RunRecord& run) {

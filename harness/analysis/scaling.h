@@ -28,8 +28,8 @@ struct ScalingSeries {
   std::optional<Interval> time_upper;               ///< the same over the upper half of the points, if it has three
 };
 
-/// Variance of a sample over its squared mean, averaged over the channels; of a free path the variance of its weight, whose mean
-/// is 1.
+/// Variance of a sample over its squared mean, averaged over the channels; of a free path the variance of its weight in the first
+/// channel, whose mean is 1.
 std::optional<Real> scaled_variance(const CellRecord& record);
 
 /// All such series of a run's sampled cells.

@@ -254,9 +254,8 @@ class CommandLine {
 
   void add_list() {
     CLI::App* command = add("list", "List the names that configurations may use, with parameters and sources", [this] {
-      const std::vector<std::string> lists = {"estimators", "media", "majorants", "rays", "quantities"};
-      if (list_.what.empty()) throw InputError(fmt::format("list what? expected one of {}", fmt::join(lists, ", ")));
-      expect_one_of(list_.what, lists, "list");
+      if (list_.what.empty()) throw InputError(fmt::format("list what? expected one of {}", fmt::join(kLists, ", ")));
+      expect_one_of(list_.what, kLists, "list");
       return list_command(list_);
     });
     command->add_option("WHAT", list_.what, "estimators, media, majorants, rays or quantities");
@@ -266,7 +265,7 @@ class CommandLine {
 
   void add_schema() {
     CLI::App* command = add("schema", "Print a JSON Schema (draft-07)", [this] {
-      expect_one_of(schema_, {"config", "results"}, "schema");
+      expect_one_of(schema_, kSchemas, "schema");
       fmt::print("{}\n", (schema_ == "config" ? config_schema() : results_schema()).dump(2));
       return ExitCode::ok;
     });

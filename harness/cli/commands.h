@@ -8,6 +8,10 @@
 
 namespace nullmark {
 
+/// What `nullmark list` lists, and what `nullmark schema` describes.
+inline const std::vector<std::string> kLists = {"estimators", "media", "majorants", "rays", "quantities"},
+                                      kSchemas = {"config", "results"};
+
 /// `nullmark run`.
 struct RunCommand {
   std::vector<std::string> configs;

@@ -6,13 +6,16 @@
 #include <CLI/CLI.hpp>
 #include <map>
 
+#include "harness/cli/commands.h"
+
 namespace nullmark {
 namespace {
 
 /// Words that a command takes in place of a file.
 const std::map<std::string, std::string>& words_of_commands() {
+  const auto joined = [](const std::vector<std::string>& words) { return fmt::format("{}", fmt::join(words, " ")); };
   static const std::map<std::string, std::string> kWords = {
-      {"list", "estimators media majorants rays quantities"}, {"schema", "config results"}, {"completion", "bash zsh fish"}};
+      {"list", joined(kLists)}, {"schema", joined(kSchemas)}, {"completion", joined(completed_shells())}};
   return kWords;
 }
 

@@ -18,12 +18,6 @@
 namespace nullmark {
 namespace {
 
-std::string quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? "'\\''" : std::string(1, c);
-  return result + "'";
-}
-
 std::string find_browser() {
   for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
     if (std::system(fmt::format("command -v {} >/dev/null 2>&1", name).c_str()) == 0) return name;
@@ -35,7 +29,7 @@ std::string browser_command(const std::string& options, const std::string& file,
   // Chromium's sandbox refuses to start as root, as in containers; the page is ours and loads nothing.
   return fmt::format("{} --headless=new {} --disable-gpu {} {} 2>/dev/null", find_browser(),
                      ::geteuid() == 0 ? "--no-sandbox" : "", options,
-                     quoted("file://" + std::filesystem::absolute(file).string() + query));
+                     shell_quoted("file://" + std::filesystem::absolute(file).string() + query));
 }
 
 /// A figure as a page of its own size.
@@ -45,7 +39,7 @@ void print_pdf(const Json& figure, const std::string& path) {
                    fmt::format("<!DOCTYPE html><style>@page {{ size: {}px {}px; margin: 0 }} body {{ margin: 0 }}</style>{}",
                                figure.at("width").dump(), figure.at("height").dump(), figure.at("svg").get<std::string>()));
   const std::string options =
-      "--no-pdf-header-footer --print-to-pdf=" + quoted(std::filesystem::absolute(path + ".pdf").string());
+      "--no-pdf-header-footer --print-to-pdf=" + shell_quoted(std::filesystem::absolute(path + ".pdf").string());
   const int code = std::system((browser_command(options, page) + " >/dev/null").c_str());
   std::filesystem::remove(page);
   if (code != 0) throw InputError(fmt::format("--figures: Chromium printed no {}.pdf", path));
