@@ -24,4 +24,8 @@ void negative_logarithms(const Real* x, std::size_t n, Real* out) {
   map_lanes(x, n, out, [](auto lanes) { return negative_logarithm(lanes); });
 }
 
+void exponentials(const Real* x, std::size_t n, Real* out) {
+  map_lanes(x, n, out, [](auto lanes) { return exponential(lanes); });
+}
+
 }  // namespace nullmark

@@ -19,6 +19,9 @@ Real exponential(Real x);
 /// out[i] = negative_logarithm(x[i]), in vector registers; x and out may be the same.
 void negative_logarithms(const Real* x, std::size_t n, Real* out);
 
+/// out[i] = exponential(x[i]), likewise.
+void exponentials(const Real* x, std::size_t n, Real* out);
+
 inline Real cosine(Real x) { return std::cos(x); }
 
 /// 1 - e^x without cancellation.
