@@ -19,7 +19,7 @@ namespace {
 
 using Long = long double;
 
-std::shared_ptr<const Medium> rising() { return linear(0, 2 * kLog2); }
+std::shared_ptr<const Medium> rising_line() { return linear(0, 2 * kLog2); }
 
 TEST(PoissonTail, IsTheIncompleteGammaFunctionAndShort) {
   for (const Real mean : {1e-320, 1e-300, 1e-12, 0.1, 1., 5., 99., 101., 1e3, 1e4, 1e6}) {
@@ -142,7 +142,7 @@ TEST(PowerSeries, TheoryHasThePublishedValues) {
   };
   for (const Case& c : {Case{1, false, 0, 4.1564, 0}, Case{2, false, 7.4e-11, 6.2385, .028695},
                         Case{1, true, .023620, 6.2385, .067283}, Case{2, true, .012205, 8.4213, .086115}}) {
-    const auto medium = c.rises ? rising() : constant(kLog2);
+    const auto medium = c.rises ? rising_line() : constant(kLog2);
     const Theory cmf = HandWalked<PowerSeriesCmf>({}, medium, 1, c.looseness).theory();
     EXPECT_NEAR(*cmf.variance, c.cmf, c.rises ? 5e-7 : 5e-13);
     EXPECT_NEAR(*cmf.lookups, c.cmf_lookups, 6e-5);
@@ -200,7 +200,7 @@ TEST(Cumulative, RouletteThroughoutHasTheClosedForm) {
 }
 
 TEST(Cumulative, SaysNothingWhereItsChancesDependOnThePoints) {
-  const HandWalked<PowerSeriesCumulative> hand({}, rising(), 1, 2);
+  const HandWalked<PowerSeriesCumulative> hand({}, rising_line(), 1, 2);
   EXPECT_FALSE(hand.theory().variance);
   EXPECT_FALSE(hand.theory().lookups);
   Estimate result, square, lookups;
@@ -284,7 +284,7 @@ TEST(PowerSeries, AMillionDeep) {
 }
 
 template <template <class> class Estimator>
-void expect_limits() {
+void expect_series_limits() {
   for (const Real depth : {1e6, 1e4, 800.}) {
     const HandWalked<Estimator> opaque({}, constant(depth), 1), uneven({}, linear(depth, 2 * depth), 1);
     EXPECT_EQ(opaque.walk(1).result, 0) << depth;
@@ -300,10 +300,10 @@ void expect_limits() {
 }
 
 TEST(PowerSeries, LimitsAreFinite) {
-  expect_limits<PowerSeriesRatio>();
-  expect_limits<PowerSeriesNextFlight>();
-  expect_limits<PowerSeriesCmf>();
-  expect_limits<PowerSeriesCumulative>();
+  expect_series_limits<PowerSeriesRatio>();
+  expect_series_limits<PowerSeriesNextFlight>();
+  expect_series_limits<PowerSeriesCmf>();
+  expect_series_limits<PowerSeriesCumulative>();
 }
 
 /// The sum as it is listed, without the powers of 2 set aside.
