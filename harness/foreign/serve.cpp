@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -12,6 +13,7 @@
 
 #include "harness/foreign/frames.h"
 #include "harness/foreign/library.h"
+#include "harness/foreign/patience.h"
 
 // The other side of process_tracker.cpp for a library.  Like the reader of volumes it is this executable over again, whatever
 // that is, and an initialiser answers before main() begins.
@@ -65,9 +67,10 @@ class Stream {
 
  private:
   void read(void* to, std::size_t bytes) {
+    Patience patience;
     for (auto* at = static_cast<std::byte*>(to); bytes > 0;) {
-      const ssize_t n = ::read(input_, at, bytes);
-      if (n < 0 && errno == EINTR) continue;
+      const ssize_t n = ::recv(input_, at, bytes, uses_shared_ && patience.yields() ? MSG_DONTWAIT : 0);
+      if (n < 0 && (errno == EINTR || errno == EAGAIN || errno == EWOULDBLOCK)) continue;
       if (n <= 0) throw Ended{};
       at += n;
       bytes -= static_cast<std::size_t>(n);
