@@ -19,11 +19,12 @@ namespace {
 
 using namespace false_alarms_test;
 
+constexpr std::uint64_t kSeeds = 250 / kThin;
+
 /// Trackers, media and majorants under many seeds.
 Plan unbiased_plan() {
-  const std::uint64_t seeds = 250 / kThin;
   std::string list;
-  for (std::uint64_t i = 1; i <= seeds; ++i) list += fmt::format("{}{}", i == 1 ? "" : ",", fresh_seed() * 1'000'000 + i);
+  for (std::uint64_t i = 1; i <= kSeeds; ++i) list += fmt::format("{}{}", i == 1 ? "" : ",", fresh_seed() * 1'000'000 + i);
   const auto experiment = [&](const char* name, const char* estimators, const char* media, const char* majorants) {
     return fmt::format(R"({{"name":"{}","rays":"single","samples_per_ray":2048,"own_streams":true,
         "verdict":{{"epsilon":0.1,"max_samples_per_ray":8192}},
@@ -80,7 +81,7 @@ TEST(FalseAlarms, TheProgramsOwnCells) {
     }
   }
   std::printf("%llu cells, %llu PASS\n", static_cast<unsigned long long>(cells), static_cast<unsigned long long>(passes));
-  EXPECT_GE(cells, 10'000 / kThin);
+  EXPECT_GE(cells, 40 * kSeeds);
   EXPECT_GT(passes, cells / 4);
   // Means, lookups and laws are a family each, at .1.
   expect_not_above("cells with a false FAIL", cells, fails, 0.3 / static_cast<Real>(cells));
