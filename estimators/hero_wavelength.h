@@ -43,7 +43,7 @@ struct HeroWavelengthTracking {
 
   void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
     if (walk.hero < 0) walk.hero = choose(walk.chance, ray.channels, rng);
-    const Coefficients<Value> mu(Value(smaller(extinction, at.rate())), ray.albedo_at(at.position()), at.rate());
+    const Coefficients<Value> mu = ray.coefficients(Value(smaller(extinction, at.rate())), at.position(), at.rate());
     const Value absorb = ray.draws_absorption ? mu.absorb : ray.value(0);
     const EventKind kind =
         choose_event(rng.uniform(), channel(absorb, walk.hero), channel(mu.scatter, walk.hero), channel(mu.null, walk.hero));

@@ -75,7 +75,7 @@ struct NullCollisionTracking {
   }
 
   void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Coefficients<Value> mu(extinction, ray.albedo_at(at.position()), at.rate());
+    const Coefficients<Value> mu = ray.coefficients(extinction, at.position(), at.rate());
     const Chances chance = chances(ray, mu);
     const std::optional<EventKind> kind =
         ray.three ? three_roulettes(chance, rng) : choose_event(rng.uniform(), chance.absorb, chance.scatter, chance.null);

@@ -120,7 +120,7 @@ struct SpectralTracking {
   }
 
   void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    Coefficients<Value> mu(extinction, ray.albedo_at(at.position()), at.rate());
+    Coefficients<Value> mu = ray.coefficients(extinction, at.position(), at.rate());
     if (!ray.control.empty()) mu = residual(ray, mu, at.piece());
     const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : 0,
                scatter = measure(ray, walk.weight, mu.scatter), null = measure(ray, walk.weight, mu.null);

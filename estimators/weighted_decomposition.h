@@ -93,13 +93,10 @@ struct WeightedDecompositionTracking {
   }
 
   void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Parts part = parts(ray, channel(extinction, 0), at.position(), ray.control.rate(at.piece()), at.rate());
-    const Real chosen = rng.uniform() * part.sum;
-    const bool scattered = chosen < std::abs(part.scatter), real = chosen < part.residual();
-    const Real grown = part.sum / (at.rate() - ray.control.rate(at.piece()));
-    walk.weight *= (scattered ? part.scatter : real ? part.absorb : part.null) < 0 ? -grown : grown;
-    walk.done = walk.looked_up = real;
-    if (!control_albedo.empty()) walk.kind = scattered ? EventKind::scatter : EventKind::absorb;
+    if (control_albedo.empty())
+      choose<false>(walk, ray, at, channel(extinction, 0), rng);
+    else
+      choose<true>(walk, ray, at, channel(extinction, 0), rng);
   }
 
   Value result(const Walk& walk, const RayData& ray) const { return ray.value(walk.done ? 0 : walk.weight); }
@@ -151,16 +148,34 @@ struct WeightedDecompositionTracking {
     Real residual() const { return std::abs(scatter) + std::abs(absorb); }
   };
 
+  template <bool kFive>
+  void choose(Walk& walk, const RayData& ray, const Flight& at, Real mu, auto& rng) const {
+    const Real mu_c = ray.control.rate(at.piece());
+    const Parts part = parts<kFive>(ray, mu, at.position(), mu_c, at.rate());
+    const Real chosen = rng.uniform() * part.sum;
+    const bool scattered = kFive && chosen < std::abs(part.scatter);
+    const bool real = chosen < (kFive ? part.residual() : std::abs(part.absorb));
+    const Real grown = part.sum / (at.rate() - mu_c);
+    walk.weight *= (scattered ? part.scatter : real ? part.absorb : part.null) < 0 ? -grown : grown;
+    walk.done = walk.looked_up = real;
+    if (kFive) walk.kind = scattered ? EventKind::scatter : EventKind::absorb;
+  }
+
+  Parts parts(const RayData& ray, Real mu, Real t, Real mu_c, Real mub) const {
+    return control_albedo.empty() ? parts<false>(ray, mu, t, mu_c, mub) : parts<true>(ray, mu, t, mu_c, mub);
+  }
+
   /// Where nothing has changed sign the sum is mub - mu_c itself, so that weights stay 1 to the last bit.
+  template <bool kFive>
   Parts parts(const RayData& ray, Real mu, Real t, Real mu_c, Real mub) const {
     Parts part{0, mu - mu_c, mub - mu, 0};
-    if (!control_albedo.empty()) {
+    if constexpr (kFive) {
       const Real albedo = channel(ray.albedo_at(t), 0);
       part.scatter = albedo * mu - control_albedo[0] * mu_c;
       part.absorb = (1 - albedo) * mu - (1 - control_albedo[0]) * mu_c;
     }
-    const bool bounding = part.scatter >= 0 && part.absorb >= 0 && part.null >= 0;
-    part.sum = bounding ? mub - mu_c : part.residual() + std::abs(part.null);
+    const bool bounding = (!kFive || part.scatter >= 0) && part.absorb >= 0 && part.null >= 0;
+    part.sum = bounding ? mub - mu_c : (kFive ? part.residual() : std::abs(part.absorb)) + std::abs(part.null);
     return part;
   }
 

@@ -45,14 +45,14 @@ Law gauss_rule(const Law& law, Eigen::Index size) {
 
 constexpr int kMostOrder = 28;
 
-/// Coefficients of a polynomial in s, by their power; as many as fill whole registers, and a 0.
+/// SeriesCoefficients of a polynomial in s, by their power; as many as fill whole registers, and a 0.
 constexpr std::size_t kPowers = 32;
 static_assert(kPowers > kMostOrder);
-using Coefficients = std::array<Real, kPowers + 1>;
+using SeriesCoefficients = std::array<Real, kPowers + 1>;
 
 /// Weight of the k-th mean of symmetric products of n differences, for all k <= n.
-Coefficients series_weights(int n) {
-  Coefficients weight{1};
+SeriesCoefficients series_weights(int n) {
+  SeriesCoefficients weight{1};
   Real choose = 1;
   for (int k = 1; k <= n; ++k) {
     choose *= static_cast<Real>(n - k + 1) / k;
@@ -82,8 +82,8 @@ class SymmetricMoments {
   }
 
   /// E[sum_k a_k m_k sum_l a_l m_l], m_k over n differences, of weights a: the N others and, where N = n - 1, the pivots' own.
-  Real series(const Coefficients& weight, Real first, Real second) const {
-    Coefficients sums{};
+  Real series(const SeriesCoefficients& weight, Real first, Real second) const {
+    SeriesCoefficients sums{};
     for (std::size_t l = 0; l <= count_; ++l) {
       const Pack factor(weight[l] + second * weight[l + 1]);
       for (std::size_t k = 0; k <= count_; k += kWidth)
@@ -99,7 +99,7 @@ class SymmetricMoments {
   static constexpr std::size_t kWidth = kNativeLanes<Real>;
   using Pack = Lanes<Real, kWidth>;
 
-  /// Coefficients of t^l by powers of s; one below the first is 0.
+  /// SeriesCoefficients of t^l by powers of s; one below the first is 0.
   Real* power(std::size_t l) { return &at_[l * (kPowers + 1) + 1]; }
   const Real* power(std::size_t l) const { return &at_[l * (kPowers + 1) + 1]; }
 
@@ -133,7 +133,7 @@ std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Re
   for (std::size_t n = 3; n <= kMostOrder; ++n) chance[n] = chance[n - 1] * 2 / static_cast<Real>(n);
   for (std::size_t n = 2; n < kMostOrder; ++n) chance[n] -= chance[n + 1];
   static const auto kWeights = [] {
-    std::array<Coefficients, kMostOrder + 1> weights;
+    std::array<SeriesCoefficients, kMostOrder + 1> weights;
     for (int n = 0; n <= kMostOrder; ++n) weights[static_cast<std::size_t>(n)] = series_weights(n);
     return weights;
   }();
@@ -164,7 +164,7 @@ std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Re
       const Real both = rule.w[i] * rule.w[j] * exponential(x + z) * (i == j ? 1 : 2);
       for (int n = 0; n < orders; ++n) {
         const Real p = chance[static_cast<std::size_t>(n)] / (n + 1);
-        const Coefficients& weights = kWeights[static_cast<std::size_t>(n)];
+        const SeriesCoefficients& weights = kWeights[static_cast<std::size_t>(n)];
         if (n > 0) {
           if (p > 0) square += n * p * both * others.series(weights, z - x, x - z);
           others.add_one();

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimators/walk/event_choice.h"
 #include "estimators/walk/flight.h"
 #include "media/base/albedo_field.h"
 #include "media/base/value.h"
@@ -36,6 +37,12 @@ struct MediumRay {
 
   /// mu_s / mu at a distance.
   Value albedo_at(Real t) const { return albedo_field ? read_albedo(t) : albedo; }
+
+  /// mu_a, mu_s and mub - mu at a distance.
+  Coefficients<Value> coefficients(const Value& extinction, Real t, Real mub) const {
+    if (albedo_field) return {extinction, read_albedo(t), mub};
+    return {extinction, albedo, mub};
+  }
 
   void set_albedo(const Value& most, const AlbedoField* field, const Ray& world) {
     albedo = most;
