@@ -200,6 +200,20 @@ TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
   EXPECT_NE(read("out").find("compare"), std::string::npos);
 }
 
+TEST_F(Cli, UniformNextEventsUnderNarrowPhaseFunctionsAreWarnedOf) {
+  for (const char* next_event : {"uniform", "mis"})
+    for (const Real anisotropy : {0.5, -0.9}) {
+      write("g.json",
+            fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e","rays":"single",
+          "samples_per_ray":10,"quantity":"radiance","transport":{{"environment":1,"next_event":"{}"}},
+          "matrix":{{"estimator":"delta","medium":{{"type":"linear","albedo":0.5,"anisotropy":{}}}}}}}]}})",
+                        next_event, anisotropy));
+      EXPECT_EQ(run("run g.json --force"), 0) << read("err");
+      const bool warned = read("err").find("draws next events uniformly under a mean cosine of -0.9") != std::string::npos;
+      EXPECT_EQ(warned, std::string(next_event) == "uniform" && anisotropy < 0) << read("err");
+    }
+}
+
 TEST_F(Cli, FiguresWithoutABrowserAreRefusedAtOnce) {
   ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");
   const char* path = std::getenv("PATH");

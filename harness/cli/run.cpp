@@ -156,6 +156,24 @@ void warn_of_own_seeds(const Plan& plan, std::uint64_t seed) {
     notice("nullmark: warning: experiment \"{}\" names its seeds itself; --seed does not change them\n", own->experiment);
 }
 
+/// A uniform next event under a mean cosine of g has the second moment (1 + g^2)/(1 - g^2)^2 at each scattering: at .999 few
+/// samples see it, and the others tell a mean that is too small.
+void warn_of_narrow_phases(const Plan& plan, const std::vector<bool>& selected) {
+  constexpr Real kMost = 10;
+  for (std::size_t i = 0; i < plan.cells.size(); ++i) {
+    const Cell& cell = plan.cells[i];
+    if (!selected[i] || cell.transport.next_event != "uniform") continue;
+    const Real g = plan.media[cell.medium].anisotropy, second = (1 + g * g) / ((1 - g * g) * (1 - g * g));
+    if (second <= kMost) continue;
+    notice(
+        "nullmark: warning: experiment \"{}\" draws next events uniformly under a mean cosine of {:g}: each scattering "
+        "multiplies "
+        "the second moment by {:.3g}; take \"next_event\": \"mis\"\n",
+        cell.experiment, g, second);
+    return;
+  }
+}
+
 /// Throws InputError where the output may not be written, or is there and neither to be completed nor replaced.
 std::unique_ptr<Journal> open_journal(const RunCommand& command, const std::vector<ConfigSource>& sources, const Plan& plan,
                                       const std::string& output) {
@@ -261,6 +279,7 @@ ExitCode run_command(const RunCommand& command) {
     return ExitCode::nothing_ran;
   }
   if (seed) warn_of_own_seeds(plan, *seed);
+  warn_of_narrow_phases(plan, selected);
   expect_threads(command.threads);
   if (command.dry_run) return dry_run(plan, selected, !command.no_timing);
 
