@@ -15,7 +15,6 @@
 #include <thread>
 
 #include "harness/foreign/ascii_line.h"
-#include "harness/foreign/patience.h"
 #include "harness/foreign/spawner.h"
 #include "media/base/parameters.h"
 
@@ -197,7 +196,6 @@ void Child::send(FrameKind kind, std::span<const std::byte> payload) {
 }
 
 void Child::receive_into(std::byte* to, std::size_t bytes, Clock::time_point deadline) {
-  Patience patience;
   while (bytes > 0) {
     if (ahead_at_ < read_ahead_.size()) {
       const std::size_t n = std::min(bytes, read_ahead_.size() - ahead_at_);
@@ -214,10 +212,11 @@ void Child::receive_into(std::byte* to, std::size_t bytes, Clock::time_point dea
     read_ahead_.resize(n > 0 && !direct ? static_cast<std::size_t>(n) : 0);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
-      if (!uses_shared_ || !patience.yields()) wait(POLLIN, deadline);
+      if (!uses_shared_ || !patience_.asks_again()) wait(POLLIN, deadline);
       continue;
     }
     if (n <= 0) fail("the tracker's process closed its output");
+    patience_.answered();
     if (direct) {
       to += n;
       bytes -= static_cast<std::size_t>(n);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "harness/foreign/frames.h"
+#include "harness/foreign/patience.h"
 
 namespace nullmark {
 
@@ -75,6 +76,7 @@ class Child {
   int socket_ = -1, errors_ = -1, memory_ = -1;
   std::byte* shared_ = nullptr;  ///< this side's half, then the process's
   bool uses_shared_ = false;
+  Patience patience_;
   std::uint32_t sent_ = 0, received_ = 0;
   std::uint64_t moved_ = 0;
   std::vector<std::byte> payload_, read_ahead_;

@@ -1,28 +1,43 @@
 #pragma once
 
-#include <sched.h>
+#include <hwy/cache_control.h>
 
+#include <algorithm>
 #include <chrono>
 
 namespace nullmark {
 
-/// How long to ask again for the other side's frame before sleeping: to be woken takes longer than most answers.  The processor is
-/// yielded meanwhile, for the other side may need it.
+/// Whether to ask again for the other side's frame before sleeping: to be woken takes longer than most answers.  Where that was
+/// in vain, since others need the processor, it sleeps at once for a while, up to 255 frames.
 class Patience {
  public:
-  /// Whether to ask again, once others have run.
-  bool yields() {
+  /// Called whenever there is no frame yet: whether to ask again at once.
+  bool asks_again() {
     const auto now = Clock::now();
-    if (!began_) until_ = now + std::chrono::microseconds(100);
-    began_ = true;
-    if (now > until_) return false;
-    ::sched_yield();
-    return true;
+    if (!waiting_) {
+      waiting_ = true;
+      asks_ = rest_ == 0;
+      if (!asks_) --rest_;
+      until_ = now + std::chrono::microseconds(100);
+    }
+    if (asks_ && now < until_) {
+      hwy::Pause();
+      return true;
+    }
+    if (asks_) rest_ = in_vain_ = std::min(2 * in_vain_ + 1, 255);
+    asks_ = false;
+    return false;
+  }
+
+  void answered() {
+    if (waiting_ && asks_) in_vain_ = 0;
+    waiting_ = false;
   }
 
  private:
   using Clock = std::chrono::steady_clock;
-  bool began_ = false;
+  bool waiting_ = false, asks_ = false;
+  int rest_ = 0, in_vain_ = 0;
   Clock::time_point until_;
 };
 

@@ -67,11 +67,11 @@ class Stream {
 
  private:
   void read(void* to, std::size_t bytes) {
-    Patience patience;
     for (auto* at = static_cast<std::byte*>(to); bytes > 0;) {
-      const ssize_t n = ::recv(input_, at, bytes, uses_shared_ && patience.yields() ? MSG_DONTWAIT : 0);
+      const ssize_t n = ::recv(input_, at, bytes, uses_shared_ && patience_.asks_again() ? MSG_DONTWAIT : 0);
       if (n < 0 && (errno == EINTR || errno == EAGAIN || errno == EWOULDBLOCK)) continue;
       if (n <= 0) throw Ended{};
+      patience_.answered();
       at += n;
       bytes -= static_cast<std::size_t>(n);
     }
@@ -89,6 +89,7 @@ class Stream {
   std::byte* theirs_ = nullptr;
   std::size_t half_ = 0;
   bool uses_shared_ = false;
+  Patience patience_;
   std::uint32_t sent_ = 0;
   std::vector<std::byte> payload_;
   PayloadWriter frame_;
