@@ -36,7 +36,7 @@ struct BidirectionalMis {
   struct Prefix {
     std::vector<Real> depth;    ///< majorant depth from the ray's begin
     std::vector<Value> weight;  ///< product of null ratios up to the vertex, its own included
-    std::vector<Real> gap;      ///< e^gap to the vertex before; of the ray's end the last
+    std::vector<Real> gap;      ///< e^gap to the vertex before; the last entry is that of the ray's end
     std::vector<Real> gaps;     ///< sum of them up to the vertex
     Real all_gaps = 0;          ///< sum of e^gap of the whole walk
     Value whole;                ///< product of all null ratios
@@ -135,12 +135,12 @@ struct BidirectionalMis {
   static void group(Walk& walk) {
     const Prefix& a = walk.forwards;
     Prefix& b = walk.backwards;
-    const std::size_t n = b.depth.size(), whole = begin_of_group(n) + kTogether;
-    walk.to_last.assign(whole, 1);
+    const std::size_t n = b.depth.size(), padded = begin_of_group(n) + kTogether;
+    walk.to_last.assign(padded, 1);
     for (std::size_t j = n - 1; j-- > 0;)
       if ((j + 1) % kTogether != 0) walk.to_last[j] = walk.to_last[j + 1] * b.gap[j + 1];
-    b.gaps.resize(whole, 0);
-    b.weight.resize(whole, b.whole * 0);
+    b.gaps.resize(padded, 0);
+    b.weight.resize(padded, b.whole * 0);
     walk.ahead.resize(a.depth.size());
     walk.to_group.resize(a.depth.size());
     std::size_t ahead = n;

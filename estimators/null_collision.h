@@ -98,7 +98,7 @@ struct NullCollisionTracking {
       rate.push_back(mub);
       Value extinction = ray.value(0);
       for (int l = 0; l < ray.channels; ++l) channel(extinction, l) = profile.nodes(l)[j].extinction;
-      const Coefficients<Value> mu(extinction, ray.albedo_at(profile.nodes(c)[j].t), mub);
+      const Coefficients<Value> mu = ray.coefficients(extinction, profile.nodes(c)[j].t, mub);
       const Real p = mub > 0 ? chances(ray, mu).null : 0, mu_n = channel(mu.null, c);
       through.push_back(mub * p);
       death.push_back(mub - through.back());
@@ -115,7 +115,7 @@ struct NullCollisionTracking {
       const Real mub = ray.majorant.rate(profile.nodes(c)[j].piece);
       Value extinction = ray.value(0);
       for (int l = 0; l < ray.channels; ++l) channel(extinction, l) = profile.nodes(l)[j].extinction;
-      const Coefficients<Value> mu(extinction, ray.albedo_at(profile.nodes(c)[j].t), mub);
+      const Coefficients<Value> mu = ray.coefficients(extinction, profile.nodes(c)[j].t, mub);
       const Chances chance = mub > 0 ? chances(ray, mu) : Chances{0, 0, 0};
       const auto second = [&](EventKind kind) {
         const Real own = channel(mu.of(kind), c), p = chance.of(kind);

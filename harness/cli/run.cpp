@@ -156,8 +156,8 @@ void warn_of_own_seeds(const Plan& plan, std::uint64_t seed) {
     notice("nullmark: warning: experiment \"{}\" names its seeds itself; --seed does not change them\n", own->experiment);
 }
 
-/// A uniform next event under a mean cosine of g has the second moment (1 + g^2)/(1 - g^2)^2 at each scattering: at .999 few
-/// samples see it, and the others tell a mean that is too small.
+/// A uniform next event under a mean cosine of g has the second moment (1 + g^2)/(1 - g^2)^2 at each scattering: at .999 rare
+/// samples carry the mean, and an estimate without them is too small.
 void warn_of_narrow_phases(const Plan& plan, const std::vector<bool>& selected) {
   constexpr Real kMost = 10;
   for (std::size_t i = 0; i < plan.cells.size(); ++i) {

@@ -7,8 +7,8 @@
 
 namespace nullmark {
 
-/// Whether to ask again for the other side's frame before sleeping: to be woken takes longer than most answers.  Where that was
-/// in vain, since others need the processor, it sleeps at once for a while, up to 255 frames.
+/// How long one side asks for the other's frame before it sleeps: 100 us, because to be woken takes longer than most answers.  If
+/// no frame came, others may need the processor, and the next frames are waited for asleep: 1, then 3, then 7 and up to 255.
 class Patience {
  public:
   /// Called whenever there is no frame yet: whether to ask again at once.
