@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "estimators/theory/log_factorial.h"
 #include "estimators/theory/march_law.h"
@@ -11,37 +12,54 @@
 namespace nullmark {
 namespace {
 
-/// Gauss rule of a discrete law, by Lanczos with full reorthogonalisation [Golub and Welsch 1969].
-Law gauss_rule(const Law& law, Eigen::Index size) {
-  const auto n = static_cast<Eigen::Index>(law.x.size());
-  size = std::min(size, n);
-  const Eigen::Map<const Eigen::ArrayXd> x(law.x.data(), n), w(law.w.data(), n);
-  Eigen::MatrixXd basis(n, size);
-  Eigen::VectorXd diagonal(size), below(size);
-  Eigen::VectorXd next = w.sqrt();
-  const Real scale = (x - law.mean()).abs().maxCoeff();
-  Eigen::Index used = 0;
-  for (; used < size; ++used) {
-    const Real norm = next.norm();
-    if (used > 0) {
-      below[used - 1] = norm;
-      if (!(norm > 1e-10 * scale)) break;
+/// Gauss rules of a discrete law, by Lanczos with full reorthogonalisation [Golub and Welsch 1969].
+class GaussRules {
+ public:
+  /// Rules of up to `most` nodes; the law outlives them.
+  GaussRules(const Law& law, Eigen::Index most)
+      : x_(law.x.data(), static_cast<Eigen::Index>(law.x.size())),
+        scale_((x_ - law.mean()).abs().maxCoeff()),
+        basis_(x_.size(), std::min(most, x_.size())),
+        diagonal_(basis_.cols()),
+        below_(basis_.cols()),
+        next_(Eigen::Map<const Eigen::ArrayXd>(law.w.data(), x_.size()).sqrt()) {}
+
+  /// The rule of so many nodes; of fewer where those reproduce the law.  Sizes asked for ascend.
+  Law rule(Eigen::Index size) {
+    while (used_ < std::min(size, basis_.cols()) && grow()) {
     }
-    basis.col(used) = next / norm;
-    next = basis.col(used).array() * x;
-    diagonal[used] = basis.col(used).dot(next);
+    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
+    solver.computeFromTridiagonal(diagonal_.head(used_), below_.head(std::max<Eigen::Index>(0, used_ - 1)));
+    Law rule;
+    for (Eigen::Index i = 0; i < used_; ++i) {
+      rule.x.push_back(solver.eigenvalues()[i]);
+      rule.w.push_back(solver.eigenvectors()(0, i) * solver.eigenvectors()(0, i));
+    }
+    return rule;
+  }
+
+ private:
+  bool grow() {
+    const Real norm = next_.norm();
+    if (used_ > 0) {
+      below_[used_ - 1] = norm;
+      if (!(norm > 1e-10 * scale_)) return false;
+    }
+    basis_.col(used_) = next_ / norm;
+    next_ = basis_.col(used_).array() * x_;
+    diagonal_[used_] = basis_.col(used_).dot(next_);
     for (int twice = 0; twice < 2; ++twice)
-      for (Eigen::Index j = 0; j <= used; ++j) next -= basis.col(j).dot(next) * basis.col(j);
+      for (Eigen::Index j = 0; j <= used_; ++j) next_ -= basis_.col(j).dot(next_) * basis_.col(j);
+    ++used_;
+    return true;
   }
-  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
-  solver.computeFromTridiagonal(diagonal.head(used), below.head(std::max<Eigen::Index>(0, used - 1)));
-  Law rule;
-  for (Eigen::Index i = 0; i < used; ++i) {
-    rule.x.push_back(solver.eigenvalues()[i]);
-    rule.w.push_back(solver.eigenvectors()(0, i) * solver.eigenvectors()(0, i));
-  }
-  return rule;
-}
+
+  Eigen::Map<const Eigen::ArrayXd> x_;
+  Real scale_;
+  Eigen::MatrixXd basis_;
+  Eigen::VectorXd diagonal_, below_, next_;
+  Eigen::Index used_ = 0;
+};
 
 constexpr int kMostOrder = 28;
 
@@ -108,52 +126,16 @@ class SymmetricMoments {
   std::array<Real, kPowers*(kPowers + 1) + 1> at_{};
 };
 
-}  // namespace
+/// p(n) of the roulette, by n, and what is left of it.
+using OrderChances = std::array<Real, kMostOrder + 1>;
 
-// One derivation, read from top to bottom.
-std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Real steps, bool endpoint_matching) {
-  if (has_constant_extinction(profile, c)) return 0;
-  const Real tau = profile.optical_depth(c), scale = std::exp(-2 * tau);
-  if (!(scale > std::numeric_limits<Real>::min())) return std::nullopt;
-  Real slope = 0;
-  if (endpoint_matching) {
-    const std::vector<Real> ends = extinction_at(profile, c, {profile.begin(), profile.end()});
-    slope = ends[1] - ends[0];
-    const bool affine = std::all_of(profile.nodes(c).begin(), profile.nodes(c).end(), [&](const auto& node) {
-      const Real line = ends[0] + slope * (node.t - profile.begin()) / (profile.end() - profile.begin());
-      return std::abs(node.extinction - line) <= 1e-14 * std::max(ends[0], ends[1]);
-    });
-    if (affine) return 0;
-  }
-  std::optional<Law> depth = uniform_law(profile, c, steps, slope);
-  if (!depth) return std::nullopt;
-  for (Real& x : depth->x) x = tau - x;
-  // p(n) of the roulette, and what pivots add at first order: the mean of n + 1 marches.
-  std::array<Real, kMostOrder + 1> chance{0.9, 0, 0.1};
-  for (std::size_t n = 3; n <= kMostOrder; ++n) chance[n] = chance[n - 1] * 2 / static_cast<Real>(n);
-  for (std::size_t n = 2; n < kMostOrder; ++n) chance[n] -= chance[n + 1];
+/// First and second moment of a march's answer over e^{-tau}, by a rule for the law of the march's error.
+std::pair<Real, Real> pivoted_moments(const Law& rule, const OrderChances& chance, int orders) {
   static const auto kWeights = [] {
     std::array<SeriesCoefficients, kMostOrder + 1> weights;
     for (int n = 0; n <= kMostOrder; ++n) weights[static_cast<std::size_t>(n)] = series_weights(n);
     return weights;
   }();
-  const Real spread = depth->variance();
-  constexpr Real kFirstOrder = 1e-12;
-  if (spread < kFirstOrder) {
-    Real share = 0;
-    for (std::size_t n = 0; n < kMostOrder; ++n) share += chance[n] / static_cast<Real>(n + 1);
-    return scale * spread * share;
-  }
-  const auto [least, most] = std::minmax_element(depth->x.begin(), depth->x.end());
-  // Orders up to a chance of 10^-14, and on until a difference y has lost its weight (y^n/n!)^2/P_n = 20 (y^2/2)^n/n!.
-  constexpr int kFewestOrders = 21;
-  constexpr Real kLost = 1e-9;
-  const Real y = *most - *least;
-  int orders = kFewestOrders;
-  while (20 * std::exp(orders * std::log(y * y / 2) - log_factorial(orders) + 2 * *most) > kLost)
-    if (++orders > kMostOrder) return std::nullopt;
-  constexpr Eigen::Index kPivots = 16;
-  const Law rule = gauss_rule(*depth, kPivots);
   const Real mean = rule.mean(), variance = rule.variance();
   Real square = 0, first = 0;
   const auto pivots = rule.x.size();
@@ -177,9 +159,62 @@ std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Re
         }
       }
     }
-  // The mean is 1 where the rule resolves the law and no order is missing.
-  if (!(std::abs(first - 1) < 1e-6)) return std::nullopt;
-  return scale * std::max<Real>(0, square - first * first);
+  return {first, square};
+}
+
+}  // namespace
+
+// One derivation, read from top to bottom.
+std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Real steps, bool endpoint_matching) {
+  if (has_constant_extinction(profile, c)) return 0;
+  const Real tau = profile.optical_depth(c), scale = std::exp(-2 * tau);
+  if (!(scale > std::numeric_limits<Real>::min())) return std::nullopt;
+  Real slope = 0;
+  if (endpoint_matching) {
+    const std::vector<Real> ends = extinction_at(profile, c, {profile.begin(), profile.end()});
+    slope = ends[1] - ends[0];
+    const bool affine = std::all_of(profile.nodes(c).begin(), profile.nodes(c).end(), [&](const auto& node) {
+      const Real line = ends[0] + slope * (node.t - profile.begin()) / (profile.end() - profile.begin());
+      return std::abs(node.extinction - line) <= 1e-14 * std::max(ends[0], ends[1]);
+    });
+    if (affine) return 0;
+  }
+  std::optional<Law> depth = uniform_law(profile, c, steps, slope);
+  if (!depth) return std::nullopt;
+  for (Real& x : depth->x) x = tau - x;
+  // p(n) of the roulette, and what pivots add at first order: the mean of n + 1 marches.
+  OrderChances chance{0.9, 0, 0.1};
+  for (std::size_t n = 3; n <= kMostOrder; ++n) chance[n] = chance[n - 1] * 2 / static_cast<Real>(n);
+  for (std::size_t n = 2; n < kMostOrder; ++n) chance[n] -= chance[n + 1];
+  const Real spread = depth->variance();
+  constexpr Real kFirstOrder = 1e-12;
+  if (spread < kFirstOrder) {
+    Real share = 0;
+    for (std::size_t n = 0; n < kMostOrder; ++n) share += chance[n] / static_cast<Real>(n + 1);
+    return scale * spread * share;
+  }
+  const auto [least, most] = std::minmax_element(depth->x.begin(), depth->x.end());
+  // Orders up to a chance of 10^-12, and on until a difference y has lost its weight (y^n/n!)^2/P_n = 20 (y^2/2)^n/n!.
+  constexpr int kFewestOrders = 18;
+  constexpr Real kLost = 1e-9;
+  const Real y = *most - *least;
+  int orders = kFewestOrders;
+  while (20 * std::exp(orders * std::log(y * y / 2) - log_factorial(orders) + 2 * *most) > kLost)
+    if (++orders > kMostOrder) return std::nullopt;
+  // The cost grows with the square of the rule's size, and most laws are resolved by a small one.
+  constexpr Real kResolved = 1e-9;
+  constexpr Eigen::Index kMostPivots = 16;
+  GaussRules rules(*depth, kMostPivots);
+  const Real mass = std::accumulate(chance.begin(), chance.begin() + orders, Real{0});
+  Real before = kInfinity;
+  for (const Eigen::Index pivots : {Eigen::Index{4}, Eigen::Index{8}, kMostPivots}) {
+    const auto [first, square] = pivoted_moments(rules.rule(pivots), chance, orders);
+    // The mean is 1 where the rule resolves the law and no order is missing.  About 1, what is missing hardly counts.
+    const Real found = std::max<Real>(0, square - 2 * first + mass);
+    if (std::abs(first - 1) < 1e-6 && (pivots == kMostPivots || std::abs(found - before) <= kResolved * found)) return scale * found;
+    before = found;
+  }
+  return std::nullopt;
 }
 
 std::optional<Real> telescoping_variance(const RayProfile& profile, int c, Real r) {

@@ -23,6 +23,7 @@ inline bool has_constant_extinction(const RayProfile& profile, int c) {
 inline std::vector<Real> combs(const RayProfile& profile, int c, Real steps, const std::vector<Real>& offsets) {
   const Real h = (profile.end() - profile.begin()) / steps;
   std::vector<Real> t;
+  t.reserve(offsets.size() * static_cast<std::size_t>(steps));
   for (const Real o : offsets)
     for (int i = 0; i < steps; ++i) t.push_back(profile.begin() + (i + o) * h);
   return extinction_at(profile, c, t);

@@ -25,8 +25,10 @@ void append_rule(Real a, Real b, std::vector<Real>& x, std::vector<Real>& w) {
 
 std::vector<Real> extinction_at(const RayProfile& profile, int c, const std::vector<Real>& t) {
   const auto channels = static_cast<std::size_t>(profile.channels());
-  std::vector<Real> all(t.size() * channels), mu(t.size());
+  std::vector<Real> all(t.size() * channels);
   profile.extinction(t.data(), t.size(), all.data());
+  if (channels == 1) return all;
+  std::vector<Real> mu(t.size());
   for (std::size_t i = 0; i < t.size(); ++i) mu[i] = all[i * channels + static_cast<std::size_t>(c)];
   return mu;
 }

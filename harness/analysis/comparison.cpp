@@ -33,9 +33,9 @@ std::string measurement_label(const Measurement& measurement) {
 Comparison empty_comparison(const CellRecord& record) {
   Comparison comparison;
   comparison.quantity = to_string(record.cell.quantity);
-  comparison.medium = record.medium.label;
-  comparison.majorant = record.majorant.label;
-  comparison.rays = record.ray_set.label;
+  comparison.medium = record.medium->label;
+  comparison.majorant = record.majorant->label;
+  comparison.rays = record.ray_set->label;
   comparison.light = transport_label(record.cell.transport);
   comparison.measurement = measurement_label(record.cell.measurement);
   comparison.build = record.build;

@@ -27,7 +27,7 @@ struct ScenePairs {
 
 std::string scene_of(const CellRecord& record) {
   std::string scene =
-      fmt::format("{} on {}, {}, {}", record.cell.experiment, record.medium.label, record.majorant.label, record.ray_set.label);
+      fmt::format("{} on {}, {}, {}", record.cell.experiment, record.medium->label, record.majorant->label, record.ray_set->label);
   if (const std::string transport = transport_label(record.cell.transport); !transport.empty()) scene += ", " + transport;
   return fmt::format("{}, seed {}", scene, record.cell.seed);
 }

@@ -317,10 +317,10 @@ TEST(HardCases, ReferencesAgreeWithLongDouble) {
   const RunRecord run =
       run_of(plan, [](const Cell& cell) { return cell.estimator.type == "closed_form" || cell.estimator.type == "regular"; });
   const auto depth_of = [](const CellRecord& record) -> std::optional<long double> {
-    const Component& field = record.medium.field;
+    const Component& field = record.medium->field;
     if (record.cell.experiment == "rays" || record.cell.experiment == "negative_zero") return std::nullopt;
     if (field.type == "homogeneous") return std::get<Real>(field.values.at("extinction"));
-    if (const auto depth = field.values.find("optical_depth"); depth != field.values.end() && record.medium.spectrum.empty())
+    if (const auto depth = field.values.find("optical_depth"); depth != field.values.end() && record.medium->spectrum.empty())
       if (const Real value = std::get<Real>(depth->second); value > 0) return value;
     if (record.cell.experiment != "slab") return std::nullopt;
     const auto values = std::get<std::vector<Real>>(field.values.at("values")),

@@ -19,7 +19,7 @@ CellRecord passing_to(Real epsilon) {
   record.verdict->against = "reference";
   record.verdict->unbiased = Outcome::pass;
   TestRecord test;
-  test.basis = "betting";
+  test.basis = TestBasis::betting;
   test.reference = 0.5;
   test.epsilon = epsilon * test.reference;
   record.verdict->tests = {test, test};
@@ -75,7 +75,7 @@ TEST(Compare, WithoutAPassNoErrorIsProvenToBeReachable) {
 TEST(Compare, ExactTrackersAndMeasuredFloorsNeedNoMark) {
   CellRecord exact = passing_to(0.01);
   exact.claims = "exact";
-  exact.verdict->tests[0].basis = exact.verdict->tests[1].basis = "deterministic";
+  exact.verdict->tests[0].basis = exact.verdict->tests[1].basis = TestBasis::deterministic;
   exact.verdict->tests[0].rounding = 1e-12;
   EXPECT_EQ(Shown({exact}).stars, 0);
   EXPECT_EQ(Shown({marching(0.0005), marching(0.002), disproven("wrong", Outcome::fail, 0.5)}).stars, 0);

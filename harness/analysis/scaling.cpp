@@ -35,16 +35,16 @@ void add_numbers(const std::string& prefix, const Component& component, std::map
 /// All that a cell is but one of its parameters.
 std::string without(const CellRecord& record, const std::map<std::string, Real>& numbers, const std::string& axis) {
   std::string key =
-      fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}", record.cell.experiment, record.cell.estimator.type, record.medium.field.type,
-                  record.majorant.type, record.ray_set.type, to_string(record.cell.quantity), to_string(record.cell.precision),
+      fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}", record.cell.experiment, record.cell.estimator.type, record.medium->field.type,
+                  record.majorant->type, record.ray_set->type, to_string(record.cell.quantity), to_string(record.cell.precision),
                   record.cell.seed, transport_label(record.cell.transport));
   // Text and lists stand in the labels alone; numbers do as well, but would tell the points of a series apart.
-  for (const auto* component : {&record.cell.estimator, &record.medium.field, &record.majorant, &record.ray_set})
+  for (const auto* component : {&record.cell.estimator, &record.medium->field, &*record.majorant, &*record.ray_set})
     for (const auto& [name, value] : component->values)
       if (!number_of(value)) key += "|" + name + ":" + to_text(value);
-  for (const MediumSpec& channel : record.medium.per_channel) key += "|" + channel.label;
+  for (const MediumSpec& channel : record.medium->per_channel) key += "|" + channel.label;
   if (axis != "channels")
-    for (const Real factor : record.medium.spectrum) key += fmt::format("|{}", factor);
+    for (const Real factor : record.medium->spectrum) key += fmt::format("|{}", factor);
   for (const auto& [name, number] : numbers)
     if (name != axis) key += fmt::format("|{}:{}", name, number);
   return key;
@@ -63,9 +63,9 @@ std::optional<Interval> exponent(const ScalingSeries& series, std::size_t from,
 std::map<std::string, Real> numeric_parameters(const CellRecord& record) {
   std::map<std::string, Real> numbers{{"channels", record.channels}};
   add_numbers("estimator.", record.cell.estimator, numbers);
-  add_numbers("medium.", record.medium.field, numbers);
-  add_numbers("majorant.", record.majorant, numbers);
-  add_numbers("rays.", record.ray_set, numbers);
+  add_numbers("medium.", record.medium->field, numbers);
+  add_numbers("majorant.", *record.majorant, numbers);
+  add_numbers("rays.", *record.ray_set, numbers);
   return numbers;
 }
 
@@ -123,9 +123,9 @@ std::vector<ScalingSeries> scaling_series(const RunRecord& run) {
       return series.axis.rfind(prefix, 0) == 0 || (series.axis == "channels" && std::string(prefix) == "medium.") ? type : whole;
     };
     series.rest = fmt::format("{} | {} | {} | {} | {}", first.cell.experiment, to_string(first.cell.quantity),
-                              label("medium.", first.medium.label, first.medium.field.type),
-                              label("majorant.", first.majorant.label, first.majorant.type),
-                              label("rays.", first.ray_set.label, first.ray_set.type));
+                              label("medium.", first.medium->label, first.medium->field.type),
+                              label("majorant.", first.majorant->label, first.majorant->type),
+                              label("rays.", first.ray_set->label, first.ray_set->type));
     const auto time = [](const CellRecord& record) {
       return record.time ? std::optional(record.time->ns_per_sample) : std::nullopt;
     };

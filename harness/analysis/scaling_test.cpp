@@ -35,7 +35,7 @@ std::vector<CellRecord> sampled(const std::string& matrix) {
     record.majorant = plan.majorants[cell.majorant];
     record.ray_set = plan.ray_sets[cell.rays];
     record.status = Status::ok;
-    record.lookups_per_sample = std::get<Real>(record.medium.field.values.at("optical_depth"));
+    record.lookups_per_sample = std::get<Real>(record.medium->field.values.at("optical_depth"));
     cells.push_back(record);
   }
   return cells;

@@ -56,7 +56,7 @@ ExitCode tell_verdict(const JudgeCommand& command, const Plan& plan, std::vector
 }
 
 void expect_rays(const JudgeCommand& command, const ProblemScene& scene, const Plan& plan, const SampleShape& shape) {
-  const std::size_t rays = make_ray_set(plan.ray_sets[plan.cells[0].rays])->count();
+  const std::size_t rays = make_ray_set(*plan.ray_sets[plan.cells[0].rays])->count();
   if (shape.rays != rays)
     throw InputError(fmt::format("{}: found samples of {} rays; scene {} has {}", command.samples, shape.rays, scene.id(), rays));
 }

@@ -134,7 +134,7 @@ std::vector<std::string> inputs_of(const std::vector<ConfigSource>& sources, con
     for (const auto* others : {&medium.per_channel, &medium.emission_field, &medium.albedo_field})
       for (const MediumSpec& other : *others) add(other);
   };
-  for (const MediumSpec& medium : plan.media) add(medium);
+  for (const Shared<MediumSpec>& medium : plan.media) add(*medium);
   return files;
 }
 
@@ -163,7 +163,7 @@ void warn_of_narrow_phases(const Plan& plan, const std::vector<bool>& selected) 
   for (std::size_t i = 0; i < plan.cells.size(); ++i) {
     const Cell& cell = plan.cells[i];
     if (!selected[i] || cell.transport.next_event != "uniform") continue;
-    const Real g = plan.media[cell.medium].anisotropy, second = (1 + g * g) / ((1 - g * g) * (1 - g * g));
+    const Real g = plan.media[cell.medium]->anisotropy, second = (1 + g * g) / ((1 - g * g) * (1 - g * g));
     if (second <= kMost) continue;
     notice(
         "nullmark: warning: experiment \"{}\" draws next events uniformly under a mean cosine of {:g}: each scattering "

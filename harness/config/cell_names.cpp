@@ -23,7 +23,7 @@ std::array<std::string, 7> distinctions(const Plan& plan, const Cell& cell) {
   return {
       fmt::format("seed:{}", cell.seed),
       to_string(cell.quantity),
-      plan.ray_sets[cell.rays].label,
+      plan.ray_sets[cell.rays]->label,
       cell.equal_lookups ? fmt::format("equal_lookups:{}", *cell.equal_lookups) : fmt::format("samples:{}", cell.samples_per_ray),
       measured,
       transport_label(cell.transport),
@@ -62,7 +62,7 @@ void name_cells(Plan& plan) {
   for (Cell& cell : plan.cells) {
     cell.id = cell_id(plan, cell);
     cell.name = fmt::format("{}{}/{}/{}", cell.estimator.label, cell.minus ? "/minus:" + cell.minus->label : "",
-                            plan.media[cell.medium].label, plan.majorants[cell.majorant].label);
+                            plan.media[cell.medium]->label, plan.majorants[cell.majorant]->label);
     if (cell.precision != Precision::float64) cell.name += "/" + to_string(cell.precision);
     if (!cell.lanes) cell.name += "/one_walk";
   }

@@ -34,7 +34,8 @@ class PlanBuilder {
     cell.estimator = *configured.estimator;
     cell.minus = configured.minus;
     cell.medium = media_.index_of(plan_.media, *configured.medium);
-    plan_.media[cell.medium].optional &= configured.medium->optional;
+    if (!configured.medium->optional && plan_.media[cell.medium]->optional)
+      plan_.media[cell.medium].edit([](MediumSpec& medium) { medium.optional = false; });
     cell.majorant = majorants_.index_of(plan_.majorants, *configured.majorant);
     cell.rays = ray_sets_.index_of(plan_.ray_sets, *configured.rays);
     plan_.cells.push_back(std::move(cell));
@@ -45,12 +46,12 @@ class PlanBuilder {
   class Index {
    public:
     template <class Spec>
-    std::size_t index_of(std::vector<Spec>& list, const Spec& spec) {
+    std::size_t index_of(std::vector<Shared<Spec>>& list, const Spec& spec) {
       std::vector<std::size_t>& places = of_label_[spec.label];
       for (const std::size_t node : places)
-        if (list[node] == spec) return node;
+        if (*list[node] == spec) return node;
       places.push_back(list.size());
-      list.push_back(spec);
+      list.emplace_back(spec);
       return list.size() - 1;
     }
 

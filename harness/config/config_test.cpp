@@ -60,9 +60,9 @@ TEST(Config, SpectraAndChannels) {
   ASSERT_EQ(names(plan),
             (Names{"ratio/linear/spectrum:1,2/global", "ratio/linear/spectrum:3,4,5/global",
                    "ratio/channels(homogeneous|linear/end:3)/global", "ratio/channels(homogeneous|linear/end:4)/global"}));
-  EXPECT_EQ(plan.media[1].spectrum, (std::vector<Real>{3, 4, 5}));
-  EXPECT_EQ(plan.media[3].per_channel.size(), 2u);
-  EXPECT_TRUE(plan.media[3].optional);
+  EXPECT_EQ(plan.media[1]->spectrum, (std::vector<Real>{3, 4, 5}));
+  EXPECT_EQ(plan.media[3]->per_channel.size(), 2u);
+  EXPECT_TRUE(plan.media[3]->optional);
 }
 
 TEST(Config, ZipAdvancesTogether) {
@@ -70,7 +70,7 @@ TEST(Config, ZipAdvancesTogether) {
   const Plan plan = plan_of(media + R"("majorant":{"type":"prescribed","value":[1,2,3]}},"zip":[["medium","majorant"]])");
   EXPECT_EQ(plan.cells.size(), 6u);
   for (const Cell& cell : plan.cells)
-    EXPECT_EQ(plan.media[cell.medium].field.values.at("end"), plan.majorants[cell.majorant].values.at("value"));
+    EXPECT_EQ(plan.media[cell.medium]->field.values.at("end"), plan.majorants[cell.majorant]->values.at("value"));
   EXPECT_EQ(error_of(experiment(media + R"("majorant":["global"]},"zip":[["medium","majorant"]])")),
             "t.json: /experiments/0/matrix/majorant: found 1 values; expected 3, as many as \"medium\" it is zipped with");
 }
@@ -146,7 +146,7 @@ TEST(Config, AppliedConfigurationGivesTheSamePlan) {
     EXPECT_TRUE(again.cells[i].images);
   }
   EXPECT_EQ(again.media, plan.media);
-  EXPECT_TRUE(again.media[0].optional);
+  EXPECT_TRUE(again.media[0]->optional);
   EXPECT_EQ(again.timing.seconds, 0.1);
 }
 
@@ -258,7 +258,7 @@ TEST(Config, CommentKeysAreIgnoredEverywhere) {
 TEST(ParameterValues, VariablesAreReplacedWhenBuiltAndNamedWhenUnset) {
   ::unsetenv("NULLMARK_TEST_FOLDER");
   const Plan plan = plan_of(R"("matrix":{"estimator":"ratio","medium":{"type":"vdb","file":"${NULLMARK_TEST_FOLDER}/a.vdb"}})");
-  const Component& vdb = plan.media[0].field;
+  const Component& vdb = plan.media[0]->field;
   EXPECT_EQ(std::get<std::string>(vdb.values.at("file")), "${NULLMARK_TEST_FOLDER}/a.vdb");
   try {
     make_medium(vdb);

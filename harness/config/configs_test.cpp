@@ -63,7 +63,7 @@ TEST(Configs, SlabReferencesAreQuadratures) {
   std::map<std::vector<Real>, int> seen;
   for (const Cell& cell : plan.cells) {
     ASSERT_TRUE(cell.reference) << cell.name;
-    const MediumSpec& medium = plan.media[cell.medium];
+    const MediumSpec& medium = *plan.media[cell.medium];
     ASSERT_EQ(medium.field.type, "linear");
     if (seen[cell.reference->value]++ > 0) continue;
     for (std::size_t c = 0; c < cell.reference->value.size(); ++c) {
@@ -102,7 +102,8 @@ TEST(Configs, Seed003RelationsAreMet) {
 /// their pixels here, which leaves their errors what they are (claims C08 and C09 have all of them).
 TEST(Configs, Seed004TableIsReproducedAndCorrected) {
   Plan plan = shipped("seed_004_table1.json");
-  for (Component& rays : plan.ray_sets) rays.values["width"] = rays.values["height"] = std::get<int>(rays.values.at("width")) / 2;
+  for (Shared<Component>& rays : plan.ray_sets)
+    rays.edit([](Component& set) { set.values["width"] = set.values["height"] = std::get<int>(set.values.at("width")) / 2; });
   for (Cell& cell : plan.cells) cell.verdict.enabled = false;
   const auto records = run_untimed(plan);
   struct Row {
@@ -160,15 +161,15 @@ TEST(Configs, Seed000ResidualsHaveTheirExpectation) {
 TEST(Configs, Seed000TreesLeaveHomogeneousMediaAlone) {
   const Plan plan = shipped("seed_000_kdtree.json");
   const auto records = run_untimed(plan, [&](const Cell& cell) {
-    return cell.experiment == "procedural" && plan.media[cell.medium].field.type == "homogeneous";
+    return cell.experiment == "procedural" && plan.media[cell.medium]->field.type == "homogeneous";
   });
   std::map<std::string, const CellRecord*> global;
   for (const CellRecord& record : records)
-    if (record.majorant.type == "global") global[record.cell.estimator.label] = &record;
+    if (record.majorant->type == "global") global[record.cell.estimator.label] = &record;
   EXPECT_EQ(global.size(), 4u);
   int trees = 0;
   for (const CellRecord& record : records) {
-    if (record.majorant.type != "kd_tree" && record.majorant.type != "octree") continue;
+    if (record.majorant->type != "kd_tree" && record.majorant->type != "octree") continue;
     ++trees;
     const CellRecord& one = *global.at(record.cell.estimator.label);
     EXPECT_EQ(record.structure->cells, 1u) << record.cell.name;
@@ -222,9 +223,10 @@ class RealVolumes : public testing::Test {
 TEST_F(RealVolumes, ReferencesAgreeWithAMillionStepMarch) {
   const Plan plan = shipped("volumes.json");
   constexpr int kSteps = 1'000'000;
-  for (const MediumSpec& spec : plan.media) {
+  for (const Shared<MediumSpec>& shared : plan.media) {
+    const MediumSpec& spec = *shared;
     const BuiltMedium built = build_medium(spec);
-    const BuiltRays rays = build_rays(plan.ray_sets[0], built);
+    const BuiltRays rays = build_rays(*plan.ray_sets[0], built);
     std::size_t longest = 0;
     for (std::size_t r = 0; r < rays.local.size(); ++r)
       if (rays.local[r].length() > rays.local[longest].length()) longest = r;
@@ -255,7 +257,7 @@ TEST_F(RealVolumes, ReferencesAgreeWithAMillionStepMarch) {
 
 std::function<bool(const Cell&)> ratio_on_smoke(const Plan& plan) {
   return [&plan](const Cell& cell) {
-    return plan.media[cell.medium].label.find("/smoke.vdb") != std::string::npos && cell.estimator.label == "ratio";
+    return plan.media[cell.medium]->label.find("/smoke.vdb") != std::string::npos && cell.estimator.label == "ratio";
   };
 }
 
@@ -263,7 +265,7 @@ TEST_F(RealVolumes, AGridMajorantSavesLookupsOnSmokeAndLeavesTheTransmittance) {
   Plan plan = shipped("volumes.json");
   const auto records = run_untimed(plan, ratio_on_smoke(plan));
   std::map<std::string, std::map<std::string, const CellRecord*>> by_medium;
-  for (const CellRecord& record : records) by_medium[record.medium.label][record.majorant.type] = &record;
+  for (const CellRecord& record : records) by_medium[record.medium->label][record.majorant->type] = &record;
   EXPECT_EQ(by_medium.size(), 2u);
   for (const auto& [label, pair] : by_medium) {
     const CellRecord &global = *pair.at("global"), &grid = *pair.at("grid");
@@ -282,7 +284,7 @@ TEST_F(RealVolumes, TreesSaveLookupsOnSmokeAndLeaveTheTransmittance) {
   const auto records = run_untimed(plan, ratio_on_smoke(plan));
   ASSERT_EQ(records.size(), 13u);
   const CellRecord& global = records[0];
-  EXPECT_EQ(global.majorant.type, "global");
+  EXPECT_EQ(global.majorant->type, "global");
   Real least = *global.lookups_per_sample;
   for (const CellRecord& record : records) {
     least = std::min(least, *record.lookups_per_sample);
@@ -290,7 +292,7 @@ TEST_F(RealVolumes, TreesSaveLookupsOnSmokeAndLeaveTheTransmittance) {
     EXPECT_EQ(record.majorant_violations, 0u) << record.cell.name;
     ASSERT_TRUE(record.verdict) << record.cell.name;
     EXPECT_EQ(record.verdict->unbiased, Outcome::pass) << record.cell.name << ": " << record.verdict->reason;
-    if (record.majorant.type == "kd_tree" || record.majorant.type == "octree") {
+    if (record.majorant->type == "kd_tree" || record.majorant->type == "octree") {
       EXPECT_GT(*global.lookups_per_sample, 20 * *record.lookups_per_sample) << record.cell.name;
     }
   }

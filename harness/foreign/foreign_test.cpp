@@ -96,7 +96,7 @@ TEST(Foreign, FreePathsAreJudged) {
            R"([{"type":"linear","begin":0.5,"end":2},{"type":"linear","begin":0.5,"end":2,"albedo":0.6}])",
            R"(["global",{"type":"grid","resolution":4}])", 0, 65536, more)) {
     EXPECT_EQ(word(record), "PASS") << finding(record);
-    EXPECT_EQ(record.channel.size(), record.medium.albedo.empty() ? 10u : 11u);
+    EXPECT_EQ(record.channel.size(), record.medium->albedo.empty() ? 10u : 11u);
   }
   const auto faulty = run(library(NULLMARK_TRACKERS_LIBRARY, "delta", R"("parameters":{"fault":"event"})"), R"("linear")",
                           R"(["global"])", 0, 1024, more);

@@ -30,31 +30,23 @@ std::vector<std::optional<Real>> read_reals(const JsonNode& node, int outputs) {
   return values;
 }
 
-/// A number, or a list of one per output where there are several; null where the cell was not sampled.
-struct RealsField {
-  std::vector<std::optional<Real>>& values;
-  int outputs;
-
-  Json json() const { return reals_json(values, outputs); }
-  void read(const JsonNode& node) const { values = read_reals(node, outputs); }
-  Json schema() const { return reals_schema(); }
-};
-
-/// The same of a member of all of a record's channels.
+/// A member of all channels: a number, or a list of one per output where there are several; null where the cell was not sampled.
+template <class Channel>
 struct ChannelsField {
-  CellRecord& record;
-  std::optional<Real> ChannelRecord::*member;
+  const CellRecord& record;
+  std::vector<Channel>& channels;
+  std::optional<Real> Channel::*member;
 
   Json json() const {
     std::vector<std::optional<Real>> values;
-    for (const ChannelRecord& channel : record.channel) values.push_back(channel.*member);
+    for (const Channel& channel : channels) values.push_back(channel.*member);
     return reals_json(values, outputs_of(record));
   }
   void read(const JsonNode& node) const {
     if (record.samples == 0) return;
     const std::vector<std::optional<Real>> values = read_reals(node, outputs_of(record));
-    record.channel.resize(values.size());
-    for (std::size_t c = 0; c < values.size(); ++c) record.channel[c].*member = values[c];
+    channels.resize(values.size());
+    for (std::size_t c = 0; c < values.size(); ++c) channels[c].*member = values[c];
   }
   Json schema() const { return reals_schema(); }
 };
@@ -146,11 +138,15 @@ void visit_cell(Visit& visit, CellRecord& record) {
   });
   visit.sparse("minus", OptionalEstimatorField{cell.minus}, "a second tracker, whose samples are subtracted");
   visit.part("medium", [&](auto& inner) {
-    visit_fields(inner, record.medium);
+    MediumSpec medium = *record.medium;
+    visit_fields(inner, medium);
+    if constexpr (Visit::kReads) record.medium = std::move(medium);
     inner.lenient("hash", record.medium_hash);
   });
   visit.part("majorant", [&](auto& inner) {
-    visit_component(inner, record.majorant, ComponentKind::majorant, record.majorant.label);
+    Component majorant = *record.majorant;
+    visit_component(inner, majorant, ComponentKind::majorant, majorant.label);
+    if constexpr (Visit::kReads) record.majorant = std::move(majorant);
     bool built = record.structure.has_value();
     StructureSize size = record.structure.value_or(StructureSize{});
     inner.when("cells", built, size.cells, "regions with their own bounds");
@@ -159,7 +155,9 @@ void visit_cell(Visit& visit, CellRecord& record) {
     if constexpr (Visit::kReads)
       if (built) record.structure = size;
   });
-  visit.required("ray_set", ComponentField{record.ray_set, ComponentKind::ray_set});
+  Component ray_set = *record.ray_set;
+  visit.required("ray_set", ComponentField{ray_set, ComponentKind::ray_set});
+  if constexpr (Visit::kReads) record.ray_set = std::move(ray_set);
   visit.required("quantity", cell.quantity);
   visit.lenient("precision", cell.precision);
   visit.sparse("in_lanes", record.in_lanes, "walks ran side by side in registers");
@@ -181,7 +179,7 @@ void visit_cell(Visit& visit, CellRecord& record) {
 /// What was measured and found.
 template <class Visit>
 void visit_findings(Visit& visit, CellRecord& record) {
-  const auto statistic = [&](std::optional<Real> ChannelRecord::*member) { return ChannelsField{record, member}; };
+  const auto statistic = [&](std::optional<Real> ChannelRecord::*member) { return ChannelsField<ChannelRecord>{record, record.channel, member}; };
   visit.required("status", record.status);
   visit.sparse("reason", record.reason);
   visit.sparse("build", record.build, "compiler, C library and instruction set of the cell, where not those of the provenance");
@@ -233,8 +231,9 @@ void visit_fields(Visit& visit, CellRecord& record) {
   });
   visit.list("convergence", record.convergence, [&](auto& inner, auto& step) {
     inner.required("samples", step.samples);
-    inner.required("rmse", RealsField{step.rmse, outputs_of(record)}, "of means of so many samples");
-    inner.required("variance", RealsField{step.variance, outputs_of(record)}, "of means of so many samples");
+    using Error = ConvergenceRecord::Error;
+    inner.required("rmse", ChannelsField<Error>{record, step.channel, &Error::rmse}, "of means of so many samples");
+    inner.required("variance", ChannelsField<Error>{record, step.channel, &Error::variance}, "of means of so many samples");
   });
   visit.lenient("image_maximum", record.cell.image_maximum);
   visit.sparse("instructions", record.instructions, "instructions of drawing all samples, counted in a simulator");

@@ -85,11 +85,11 @@ class Comparison {
   /// The errors of single samples, and of means of all samples.
   void expect_convergence(std::size_t c) const {
     const ChannelRecord& channel = record_.channel[c];
-    const auto figure = [&](const std::vector<std::optional<Real>>& values) {
-      return c < values.size() ? values[c] : std::nullopt;
+    const auto rmse = [&](const ConvergenceRecord& step) {
+      return c < step.channel.size() ? step.channel[c].rmse : std::nullopt;
     };
     const std::uint64_t each = record_.cell.samples_per_ray;
-    const std::optional<Real> single = figure(record_.convergence.front().rmse), all = figure(record_.convergence.back().rmse);
+    const std::optional<Real> single = rmse(record_.convergence.front()), all = rmse(record_.convergence.back());
     if (record_.convergence.back().samples == each && all) expect("rmse", channel.rmse, *all, "the last of convergence");
     if (!single || !channel.rmse || record_.convergence.front().samples != 1) return;
     const auto n = static_cast<Real>(each);

@@ -26,6 +26,7 @@ inline EnumWords words_of(Precision) { return {precision_names(), "precision"}; 
 inline EnumWords words_of(Status) { return {status_names(), "status"}; }
 inline EnumWords words_of(LawPolicy) { return {law_policies(), "policy"}; }
 inline EnumWords words_of(Tolerate) { return {tolerances(), "bias to tolerate"}; }
+inline EnumWords words_of(TestBasis) { return {test_bases(), "basis"}; }
 inline EnumWords words_of(Outcome) { return {outcome_names(), "verdict"}; }
 
 inline Json described(Json json, const std::string& text) {

@@ -77,9 +77,11 @@ RunRecord read_results(const std::string& text, const std::string& file) {
     run.cells.push_back(read_cell(cell));
     CellRecord& record = run.cells.back();
     expect_consistent(record, cell);
-    for (std::string* name : {&record.cell.name, &record.cell.experiment, &record.cell.estimator.label, &record.medium.label,
-                              &record.majorant.label, &record.ray_set.label})
-      *name = printable(*name);
+    for (std::string* name : {&record.cell.name, &record.cell.experiment, &record.cell.estimator.label}) *name = printable(*name);
+    const auto print = [](auto& spec) { spec.label = printable(spec.label); };
+    record.medium.edit(print);
+    record.majorant.edit(print);
+    record.ray_set.edit(print);
     record.reason = one_line(record.reason);
     if (!seen.insert(record.cell.name).second)
       cell.fail(fmt::format("found \"{}\" a second time; expected each cell once", record.cell.name));

@@ -37,7 +37,7 @@ TEST(ResultsJson, EveryFieldComesBackBitForBit) {
     EXPECT_EQ(a.cell.name, b.cell.name);
     EXPECT_EQ(a.cell.estimator, b.cell.estimator);
     EXPECT_EQ(a.medium, b.medium);
-    EXPECT_EQ(a.medium.label, b.medium.label);
+    EXPECT_EQ(a.medium->label, b.medium->label);
     EXPECT_EQ(a.majorant, b.majorant);
     EXPECT_EQ(a.ray_set, b.ray_set);
     ASSERT_EQ(a.channel.size(), b.channel.size());
@@ -64,7 +64,9 @@ TEST(ResultsJson, EveryFieldComesBackBitForBit) {
     EXPECT_EQ(b.time->batches[0].mad, a.time->batches[0].mad);
     EXPECT_EQ(a.structure, b.structure);
     ASSERT_EQ(a.convergence.size(), b.convergence.size());
-    EXPECT_EQ(a.convergence[1].variance, b.convergence[1].variance);
+    ASSERT_EQ(a.convergence[1].channel.size(), b.convergence[1].channel.size());
+    for (std::size_t c = 0; c < a.convergence[1].channel.size(); ++c)
+      EXPECT_EQ(a.convergence[1].channel[c].variance, b.convergence[1].channel[c].variance);
   }
   EXPECT_EQ(again.tables[0].rows[0].cells, run.tables[0].rows[0].cells);
   EXPECT_EQ(again.tables[0].rows[0].theory_of, run.tables[0].rows[0].theory_of);
@@ -89,7 +91,7 @@ TEST(ResultsJson, NothingButFiniteNumbersIsWritten) {
   run.cells[0].channel[0].variance_theory = kInfinity;
   run.cells[0].channel[0].relative_variance.reset();
   run.cells[0].time->floor_ratio = -kInfinity;
-  run.cells[1].convergence[0].rmse[2] = kInfinity;
+  run.cells[1].convergence[0].channel[2].rmse = kInfinity;
   const std::string text = results_text(run);
   const Json json = Json::parse(text);
   EXPECT_TRUE(json["cells"][0]["mean"].is_null());
@@ -146,7 +148,7 @@ TEST(ResultsJson, EditedFilesDoNotFitThemselves) {
   RunRecord run = example_results();
   TestRecord test;
   test.samples = 10;
-  test.basis = "betting";
+  test.basis = TestBasis::betting;
   VerdictRecord& verdict = run.cells[0].verdict.emplace();
   verdict.against = "reference";
   verdict.variance_basis = "analytic";

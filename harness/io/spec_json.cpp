@@ -24,9 +24,9 @@ void add_samples(Json& json, const Cell& cell) {
 /// The keys that decide the statistics.
 Json deciding_json(const Plan& plan, const Cell& cell) {
   Json json = {{"estimator", component_json(cell.estimator)},
-               {"medium", medium_json(plan.media[cell.medium])},
-               {"majorant", component_json(plan.majorants[cell.majorant])},
-               {"rays", component_json(plan.ray_sets[cell.rays])},
+               {"medium", medium_json(*plan.media[cell.medium])},
+               {"majorant", component_json(*plan.majorants[cell.majorant])},
+               {"rays", component_json(*plan.ray_sets[cell.rays])},
                {"quantity", to_string(cell.quantity)},
                {"measurement", fields_json(cell.measurement)}};
   if (cell.minus) json["minus"] = component_json(*cell.minus);
@@ -42,7 +42,7 @@ Json deciding_json(const Plan& plan, const Cell& cell) {
 /// All keys of a cell.
 Json applied_json(const Plan& plan, const Cell& cell) {
   Json json = deciding_json(plan, cell);
-  if (plan.media[cell.medium].optional) json["medium"]["optional"] = true;
+  if (plan.media[cell.medium]->optional) json["medium"]["optional"] = true;
   json["images"] = cell.images;
   json["image_maximum"] = cell.image_maximum;
   json["verdict"] = fields_json(cell.verdict);

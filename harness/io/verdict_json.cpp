@@ -12,7 +12,6 @@ namespace {
 /// Numbers that a sample gives at most: a free path's scores in every channel.
 constexpr int kMaxOutputs = kMaxChannels * (static_cast<int>(kFreePathBins) + 3);
 
-const std::vector<std::string> kBases = {"betting", "catoni", "catoni+betting", "deterministic", "none", "counted"};
 const std::vector<std::string> kTargets = {"reference", "own mean", "difference"};
 const std::vector<std::string> kVarianceBases = {"analytic", "pilot", "none"};
 
@@ -52,7 +51,7 @@ void visit_fields(Visit& visit, TestRecord& test) {
   visit.required("epsilon", figure(test.epsilon), "absolute");
   visit.lenient("reference_error", error(test.reference_error), "absolute");
   visit.lenient("variance", error(test.variance), "that the bets were planned with");
-  visit.required("basis", WordField{test.basis, kBases, "basis"});
+  visit.required("basis", test.basis);
   visit.lenient("reference", figure(test.reference), "expected mean, averaged over the rays of the test");
   visit.lenient("mean_error", figure(test.mean_error), "of the samples against it");
   if (Visit::kDescribes || test.deterministic()) {
@@ -97,7 +96,7 @@ Json groups_json(const std::vector<const TestRecord*>& groups) {
   const bool deterministic =
       std::any_of(groups.begin(), groups.end(), [](const TestRecord* test) { return test->deterministic(); });
   Json json = {{"epsilon", number_or_null(first.epsilon)}, {"samples", first.samples}};
-  for (const TestRecord* test : groups) json["basis"].push_back(test->basis);
+  for (const TestRecord* test : groups) json["basis"].push_back(test_bases()[static_cast<std::size_t>(test->basis)]);
   for (const GroupColumn& column : kGroupColumns)
     if (deterministic || !column.deterministic)
       for (const TestRecord* test : groups) json[column.key].push_back(number_or_null(test->*column.figure));
@@ -115,7 +114,7 @@ void read_groups(const JsonNode& node, int channel, std::vector<TestRecord>& tes
     groups[i].group = static_cast<int>(i);
     groups[i].epsilon = epsilon;
     groups[i].samples = node["samples"].unsigned_integer(0);
-    groups[i].basis = basis[i].one_of(kBases, "basis");
+    PlainField(groups[i].basis).read(basis[i]);
   }
   for (const auto& [key, figure, instead, deterministic] : kGroupColumns) {
     for (TestRecord& group : groups) group.*figure = instead;

@@ -94,7 +94,7 @@ TEST(Crossing, CostPredictsWhatThinWalksSpend) {
                    "majorant":[{"type":"kd_tree","resolution":32,"looseness":10000,"crossing":"rewind"},
                                {"type":"octree","max_depth":5,"looseness":10000,"crossing":"rewind"}]})");
   for (const CellRecord& record : run_untimed(plan)) {
-    const auto structure = make_majorant(record.majorant)->build(build_medium(record.medium).medium);
+    const auto structure = make_majorant(*record.majorant)->build(build_medium(*record.medium).medium);
     const auto& tree = dynamic_cast<const TreeMajorant&>(*structure);
     EXPECT_GT(tree.size().cells, 1u) << record.cell.name;
     const Real decisions = record.cell.estimator.type == "delta" ? *record.lookups_per_sample : 0;

@@ -54,13 +54,15 @@ std::optional<Real> weighted_cost(const std::optional<Real>& lookups, const std:
 
 /// Root mean square error of one sample, over rays, samples and channels.
 std::optional<Real> sample_rmse(const CellRecord& record) {
-  if (record.convergence.empty() || record.convergence[0].samples != 1 || record.convergence[0].rmse.empty()) return std::nullopt;
+  if (record.convergence.empty()) return std::nullopt;
+  const ConvergenceRecord& single = record.convergence[0];
+  if (single.samples != 1 || single.channel.empty()) return std::nullopt;
   Real sum = 0;
-  for (const std::optional<Real>& rmse : record.convergence[0].rmse) {
-    if (!rmse) return std::nullopt;
-    sum += *rmse * *rmse;
+  for (const ConvergenceRecord::Error& error : single.channel) {
+    if (!error.rmse) return std::nullopt;
+    sum += *error.rmse * *error.rmse;
   }
-  return std::sqrt(sum / static_cast<Real>(record.convergence[0].rmse.size()));
+  return std::sqrt(sum / static_cast<Real>(single.channel.size()));
 }
 
 /// The variance that a mean of n samples loses, put back.

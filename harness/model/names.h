@@ -77,6 +77,12 @@ inline const std::vector<std::string>& outcome_names() {
   return kNames;
 }
 
+/// In the order of TestBasis.
+inline const std::vector<std::string>& test_bases() {
+  static const std::vector<std::string> kNames = {"betting", "catoni", "catoni+betting", "deterministic", "none", "counted"};
+  return kNames;
+}
+
 /// In the order of LawPolicy.
 inline const std::vector<std::string>& law_policies() {
   static const std::vector<std::string> kNames = {"undecided", "always", "never"};

@@ -10,6 +10,7 @@
 
 #include "estimators/walk/quantity.h"
 #include "harness/model/published_claim.h"
+#include "harness/model/shared.h"
 
 namespace nullmark {
 
@@ -172,9 +173,9 @@ struct Table {
 /// An expanded configuration, as plain data.
 struct Plan {
   std::string name;
-  std::vector<MediumSpec> media;
-  std::vector<Component> majorants;
-  std::vector<Component> ray_sets;
+  std::vector<Shared<MediumSpec>> media;
+  std::vector<Shared<Component>> majorants;
+  std::vector<Shared<Component>> ray_sets;
   std::vector<Cell> cells;
   TimingPlan timing;
   ErrorRates error_rates;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "harness/model/plan.h"
+#include "harness/statistics/test_basis.h"
 #include "media/majorants/majorant.h"
 
 namespace nullmark {
@@ -30,8 +31,11 @@ struct ChannelRecord {
 
 /// Error of the mean of n samples, measured over all disjoint groups of n.
 struct ConvergenceRecord {
+  struct Error {
+    std::optional<Real> rmse, variance;
+  };
   std::uint64_t samples = 0;
-  std::vector<std::optional<Real>> rmse, variance;  ///< per channel
+  std::vector<Error> channel;
 };
 
 /// Cost of a sample if this many samples share a walk through the majorant structure.
@@ -58,7 +62,7 @@ struct TimeRecord {
 /// PASS: |bias| < epsilon is proven.  FAIL: a bias is proven (or one beyond epsilon, by `Tolerate`).  INCONCLUSIVE: neither is
 /// proven; the reason says why.  VIOLATED: the estimator needs a true majorant and did not have one.  None: nothing is claimed,
 /// or nothing was tested.
-enum class Outcome { none, pass, fail, inconclusive, violated };
+enum class Outcome : std::uint8_t { none, pass, fail, inconclusive, violated };
 
 /// Evidence of one test, from which `check` derives its outcome.
 struct TestRecord {
@@ -69,17 +73,16 @@ struct TestRecord {
   Real reference = 0;                     ///< expected mean, averaged over the rays of the test
   Real mean_error = 0;                    ///< mean of the samples minus the reference
   Real variance = 0;                      ///< the variance that the bets were planned with
-  /// "betting", "catoni", "catoni+betting", "deterministic", "none" (nothing could be bet), or "counted" (lookups, where the
-  /// harness draws the flights: see counted_lookups.h).
-  std::string basis;
   /// Against "mean error 0", "at most -epsilon", "at least epsilon", "within epsilon".
   Real log_e_fail = 0, log_e_low = 0, log_e_high = 0, log_e_beyond = 0;
   Real largest_error = 0, rounding = 0;  ///< of single samples; deterministic tests
   std::uint64_t planned = 0;             ///< samples per ray
-  std::vector<Real> rates;               ///< of the bets against "mean error 0"
+  std::vector<Real> rates;               ///< of the bets against "mean error 0"; of a group of rays they are not kept
   Outcome outcome = Outcome::none;
+  TestBasis basis = TestBasis::none;
 
-  bool deterministic() const { return basis == "deterministic"; }
+  bool deterministic() const { return basis == TestBasis::deterministic; }
+  bool takes_variance() const { return basis == TestBasis::catoni || basis == TestBasis::both; }
 };
 
 /// Evidence against a law that walks must follow, from which `check` derives its outcome.
@@ -129,8 +132,8 @@ struct TrackerRecord {
 
 struct CellRecord {
   Cell cell;
-  MediumSpec medium;
-  Component majorant, ray_set;
+  Shared<MediumSpec> medium;
+  Shared<Component> majorant, ray_set;
   std::string medium_hash;
   std::optional<StructureSize> structure;  ///< of the majorant; absent if it was not built
   std::string claims, range;               ///< empty of a tracker from outside that was not opened

@@ -118,12 +118,12 @@ Json convergence_row(const CellRecord& record, const std::optional<Cost>& cost) 
   Json list = Json::array();
   for (const ConvergenceRecord& step : record.convergence) {
     Real square = 0, variance = 0;
-    bool known = step.rmse.size() == record.channel.size();
-    for (std::size_t c = 0; known && c < step.rmse.size(); ++c) {
-      known = step.rmse[c] && step.variance[c];
+    bool known = step.channel.size() == record.channel.size();
+    for (const ConvergenceRecord::Error& error : step.channel) {
+      known = known && error.rmse && error.variance;
       if (!known) break;
-      square += *step.rmse[c] * *step.rmse[c] / static_cast<Real>(step.rmse.size());
-      variance += *step.variance[c] / static_cast<Real>(step.rmse.size());
+      square += *error.rmse * *error.rmse / static_cast<Real>(step.channel.size());
+      variance += *error.variance / static_cast<Real>(step.channel.size());
     }
     if (!known) continue;
     const auto n = static_cast<Real>(step.samples);
@@ -155,9 +155,9 @@ Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& image
           {"claims", record.claims},
           {"unbiased", stands_unbiased(record)},
           {"precision", to_string(cell.precision)},
-          {"medium", record.medium.label},
-          {"majorant", record.majorant.label},
-          {"rays", record.ray_set.label},
+          {"medium", record.medium->label},
+          {"majorant", record.majorant->label},
+          {"rays", record.ray_set->label},
           {"quantity", to_string(cell.quantity)},
           {"light", transport_label(cell.transport)},
           {"parameters", std::move(parameters)},

@@ -171,8 +171,8 @@ Json scaling_json(const std::vector<RunRecord>& runs, const Places& places) {
 }
 
 std::string base_name(const CellRecord& record) {
-  const auto file = record.medium.field.values.find("file");
-  if (file == record.medium.field.values.end()) return "";
+  const auto file = record.medium->field.values.find("file");
+  if (file == record.medium->field.values.end()) return "";
   const std::string* path = std::get_if<std::string>(&file->second);
   return path ? std::filesystem::path(*path).filename().string() : "";
 }

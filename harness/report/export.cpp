@@ -91,11 +91,11 @@ using Row = std::vector<std::pair<std::string, std::string>>;
 /// Of the components of a cell, by `estimator.NAME`, `medium.NAME`, `majorant.NAME` and `rays.NAME`.
 std::map<std::string, std::string> csv_parameters(const CellRecord& record) {
   std::map<std::string, std::string> parameters;
-  for (const auto& [part, component] : {std::pair<const char*, const Component&>("estimator", record.cell.estimator),
-                                        {"medium", record.medium.field},
-                                        {"majorant", record.majorant},
-                                        {"rays", record.ray_set}}) {
-    const Json json = parameters_json(component.values);
+  for (const auto& [part, component] : {std::pair("estimator", &record.cell.estimator),
+                                        {"medium", &record.medium->field},
+                                        {"majorant", &*record.majorant},
+                                        {"rays", &*record.ray_set}}) {
+    const Json json = parameters_json(component->values);
     for (const auto& [name, value] : json.items())
       parameters[fmt::format("{}.{}", part, name)] = value.is_string() ? value.get<std::string>() : value.dump();
   }
@@ -114,9 +114,9 @@ Row csv_row(const CellRecord& record, std::size_t c) {
           {"experiment", cell.experiment},
           {"estimator", cell.estimator.label},
           {"minus", cell.minus ? cell.minus->label : ""},
-          {"medium", record.medium.label},
-          {"majorant", record.majorant.label},
-          {"ray_set", record.ray_set.label},
+          {"medium", record.medium->label},
+          {"majorant", record.majorant->label},
+          {"ray_set", record.ray_set->label},
           {"quantity", to_string(cell.quantity)},
           {"precision", to_string(cell.precision)},
           {"channel", fmt::to_string(c)},

@@ -33,7 +33,7 @@ TEST(Report, ShowsTheNumbersOfTheResults) {
     }
     EXPECT_EQ(cell["lookups"].get<Real>(), *record.lookups_per_sample);
     const Json& scene = data["scenes"][cell["scene"].get<std::size_t>()];
-    EXPECT_EQ(scene["medium"], record.medium.label);
+    EXPECT_EQ(scene["medium"], record.medium->label);
     const auto in_ranking = [&](const Json& row) { return row["cell"] == i; };
     EXPECT_EQ(std::count_if(scene["ranking"].begin(), scene["ranking"].end(), in_ranking), 1);
   }

@@ -23,8 +23,8 @@ using Line = std::vector<std::string>;
 /// What the cells of one table share.
 std::string heading(const CellRecord& record) {
   const Cell& cell = record.cell;
-  std::string text = fmt::format("{}: {}, {}, {}, {}", cell.experiment, record.medium.label, record.majorant.label,
-                                 to_string(cell.quantity), record.ray_set.label);
+  std::string text = fmt::format("{}: {}, {}, {}, {}", cell.experiment, record.medium->label, record.majorant->label,
+                                 to_string(cell.quantity), record.ray_set->label);
   if (cell.equal_lookups)
     text += fmt::format(", {} lookups per ray", *cell.equal_lookups);
   else

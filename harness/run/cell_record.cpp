@@ -93,12 +93,13 @@ ChannelRecord channel_record(const CellRecord& record, const PreparedCell& prepa
 }
 
 void add_convergence(CellRecord& record, const std::vector<GroupErrors::Level>& levels, Real bias, std::size_t output) {
-  const std::vector<std::optional<Real>> none(static_cast<std::size_t>(outputs_of(record)));
+  const auto outputs = static_cast<std::size_t>(outputs_of(record));
   for (std::size_t level = 0; level < levels.size(); ++level) {
-    if (level >= record.convergence.size()) record.convergence.push_back({std::uint64_t{1} << level, none, none});
+    if (level >= record.convergence.size())
+      record.convergence.push_back({std::uint64_t{1} << level, std::vector<ConvergenceRecord::Error>(outputs)});
     const Real mean_square = levels[level].sum_of_squares / static_cast<Real>(levels[level].groups);
-    record.convergence[level].rmse[output] = finite(std::sqrt(mean_square));
-    record.convergence[level].variance[output] = finite(std::max<Real>(0, mean_square - bias * bias));
+    record.convergence[level].channel[output] = {finite(std::sqrt(mean_square)),
+                                                 finite(std::max<Real>(0, mean_square - bias * bias))};
   }
 }
 

@@ -40,7 +40,7 @@ TEST(Covering, MeetsEveryCombinationOfTheSweep) {
     for (const bool covering : {false, true}) {
       if (covering && !chosen[i]) continue;
       const Cell& cell = plan.cells[i];
-      const std::string &type = plan.media[cell.medium].field.type, &majorant = plan.majorants[cell.majorant].label;
+      const std::string &type = plan.media[cell.medium]->field.type, &majorant = plan.majorants[cell.majorant]->label;
       media[covering].insert({cell.estimator.label, type});
       bounds[covering].insert({type, majorant});
       triples[covering].insert({cell.estimator.label, majorant, cell.experiment});

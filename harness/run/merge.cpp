@@ -76,7 +76,7 @@ class MediaSeen {
     throw InputError(fmt::format(
         "{}: cell \"{}\": found the medium {} of hash {}; expected {}, as in {}: its data were replaced; "
         "run its cells again",
-        names_[part], record.cell.name, record.medium.label, record.medium_hash, at->second.first, names_[at->second.second]));
+        names_[part], record.cell.name, record.medium->label, record.medium_hash, at->second.first, names_[at->second.second]));
   }
 
  private:

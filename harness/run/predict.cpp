@@ -141,7 +141,7 @@ Forecast forecast(const Plan& plan, const std::vector<bool>& selected) {
     prediction.status = prepared.reason.empty() ? "ok" : prepared.reason;
     if (prepared.scene) {
       const std::size_t rays = prepared.scene->rays->world.size();
-      prediction.rays = make_ray_set(plan.ray_sets[prepared.cell->rays])->count();
+      prediction.rays = make_ray_set(*plan.ray_sets[prepared.cell->rays])->count();
       prediction.samples_per_ray = prepared.samples_per_ray;
       prediction.lookups_per_sample = prepared.theory.lookups;
       const double rays_for_each = static_cast<double>(prediction.rays) / static_cast<double>(std::max<std::size_t>(1, rays));

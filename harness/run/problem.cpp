@@ -39,12 +39,13 @@ std::string told(const std::string& pointer, const ParameterError& error) {
 
 /// Media of a problem name files in its folder.
 void locate_media(Plan& plan, const std::string& folder) {
-  for (MediumSpec& medium : plan.media) {
+  const auto locate = [&](MediumSpec& medium) {
     const auto file = medium.field.values.find("file");
-    if (medium.field.type != kVolumeType || file == medium.field.values.end()) continue;
+    if (medium.field.type != kVolumeType || file == medium.field.values.end()) return;
     auto* const path = std::get_if<std::string>(&file->second);
     if (path && fs::path(*path).is_relative() && !path->starts_with("${")) *path = (fs::path(folder) / *path).string();
-  }
+  };
+  for (Shared<MediumSpec>& medium : plan.media) medium.edit(locate);
 }
 
 std::string text_of(const MediumSpec& medium, const char* key, const std::string& otherwise) {
@@ -92,7 +93,7 @@ class ProblemWriter {
     problem_.timing.enabled = false;
     problem_.ray_sets = plan.ray_sets;
     problem_.majorants.resize(1);
-    problem_.majorants[0].type = "global";
+    problem_.majorants[0].edit([](Component& majorant) { majorant.type = "global"; });
   }
 
   std::vector<std::string> write() {
@@ -126,7 +127,7 @@ class ProblemWriter {
   std::size_t first_of(std::size_t scene) const {
     return static_cast<std::size_t>(std::find(originals_.begin(), originals_.end(), originals_[scene]) - originals_.begin());
   }
-  const MediumSpec& original(std::size_t scene) const { return plan_.media[originals_[scene]]; }
+  const MediumSpec& original(std::size_t scene) const { return *plan_.media[originals_[scene]]; }
 
   /// The cells of the problem, one for each scene.
   void choose() {
@@ -141,7 +142,7 @@ class ProblemWriter {
                one.transport.surfaces == cell.transport.surfaces;
       };
       if (std::any_of(problem_.cells.begin(), problem_.cells.end(), same)) continue;
-      const MediumSpec& medium = plan_.media[cell.medium];
+      const MediumSpec& medium = *plan_.media[cell.medium];
       if (medium.field.type == "channels")
         throw InputError(fmt::format("{}: found a medium of {} fields; expected a grey one, or one field with a \"spectrum\"",
                                      medium.field.pointer, medium.per_channel.size()));
@@ -171,12 +172,12 @@ class ProblemWriter {
   /// Why the medium of a cell cannot be had, if it need not be.  Throws InputError, in the words of the configuration, where it
   /// or the rays cannot be built.
   std::string why_missing(const Cell& cell) {
-    const MediumSpec& spec = plan_.media[cell.medium];
+    const MediumSpec& spec = *plan_.media[cell.medium];
     std::string where = spec.field.pointer;
     try {
       std::optional<BuiltMedium>& built = built_[cell.medium];
       if (!built) built = build_medium(spec);
-      const Component& rays = plan_.ray_sets[cell.rays];
+      const Component& rays = *plan_.ray_sets[cell.rays];
       where = rays.pointer;
       build_rays(rays, *built);
       return "";
@@ -258,7 +259,7 @@ class ProblemWriter {
   }
 
   Json volume_json(std::size_t index) const {
-    const MediumSpec& medium = problem_.media[index];
+    const MediumSpec& medium = *problem_.media[index];
     const std::string file = text_of(medium, "file", ""), grid = text_of(medium, "grid", "density"),
                       interpolation = text_of(medium, "interpolation", "trilinear"),
                       raw = fmt::format("volumes/{}.raw", id(index));

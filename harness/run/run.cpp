@@ -228,7 +228,7 @@ void expect_same_media(CellPreparer& preparer, const Plan& plan, const Records& 
     throw InputError(
         fmt::format("cell \"{}\": found the medium {} of hash {}; expected {}, as when the cell was sampled: its data "
                     "were replaced; --force runs all cells again",
-                    record.cell.name, record.medium.label, now, record.medium_hash));
+                    record.cell.name, record.medium->label, now, record.medium_hash));
   }
 }
 

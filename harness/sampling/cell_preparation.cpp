@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "harness/kernel/difference_kernel.h"
 #include "harness/kernel/path_kernel.h"
@@ -17,6 +18,9 @@
 
 namespace nullmark {
 namespace {
+
+/// Cells of a scene whose theory is computed together: they share the rays' profiles, and each holds a workspace a thread.
+constexpr std::size_t kTheoriesAtOnce = 64;
 
 /// Adds the component's JSON pointer to what its construction complains of.
 template <class F>
@@ -54,7 +58,7 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
   const Cell& cell = plan_.cells[index];
   PreparedCell prepared = unprepared(plan_, index);
   const InFlight named(cell.name);
-  const MediumSpec& spec = plan_.media[cell.medium];
+  const MediumSpec& spec = *plan_.media[cell.medium];
   if (const auto missing = missing_.find(cell.medium); missing != missing_.end()) {
     prepared.reason = missing->second;
     return prepared;
@@ -132,8 +136,8 @@ void CellPreparer::add_tracker(PreparedCell& prepared, const Component& tracker)
 /// The kernel of a radiance, composed from the scene's effects.
 void CellPreparer::add_light(PreparedCell& prepared, const EstimatorSource& source) const {
   const Cell& cell = *prepared.cell;
-  const TransportScene light = located(plan_.media[cell.medium].field.pointer, [&] {
-    return make_transport_scene(plan_.media[cell.medium], *prepared.scene->medium, prepared.scene->majorant->structure,
+  const TransportScene light = located(plan_.media[cell.medium]->field.pointer, [&] {
+    return make_transport_scene(*plan_.media[cell.medium], *prepared.scene->medium, prepared.scene->majorant->structure,
                                 cell.transport);
   });
   const Effects effects = cell.transport.general ? Effects{} : effects_of(light);
@@ -207,8 +211,8 @@ Real CellPreparer::deepest_majorant(const Scene& scene) {
 
 std::shared_ptr<const BuiltMedium> CellPreparer::medium(std::size_t index) {
   return once(media_, index, [&] {
-    return located(plan_.media[index].field.pointer,
-                   [&] { return std::make_shared<const BuiltMedium>(build_medium(plan_.media[index])); });
+    return located(plan_.media[index]->field.pointer,
+                   [&] { return std::make_shared<const BuiltMedium>(build_medium(*plan_.media[index])); });
   });
 }
 
@@ -230,11 +234,11 @@ std::shared_ptr<const Scene> CellPreparer::scene(const Cell& cell) {
   if (cut == cuts_.size()) cuts_.push_back(surfaces);
   return once(scenes_, std::array{cell.medium, cell.majorant, cell.rays, kind, cut}, [&] {
     const auto medium = this->medium(cell.medium);
-    const Component& majorant = plan_.majorants[cell.majorant];
+    const Component& majorant = *plan_.majorants[cell.majorant];
     const auto structure = once(structures_, std::array{cell.medium, cell.majorant}, [&] {
       return located(majorant.pointer, [&] { return std::make_shared<const BuiltMajorant>(build_majorant(majorant, *medium)); });
     });
-    const Component& set = plan_.ray_sets[cell.rays];
+    const Component& set = *plan_.ray_sets[cell.rays];
     const auto rays = once(rays_, std::array{cell.medium, cell.rays, cut}, [&] {
       return located(set.pointer, [&] {
         return std::make_shared<const BuiltRays>(
@@ -315,10 +319,13 @@ void add_theory(std::vector<PreparedCell>& cells, const std::function<bool()>& s
     if (prepared.scene && prepared.reason.empty() && plain && prepared.kernel->states_theory())
       by_scene[prepared.scene.get()].push_back(&prepared);
   }
-  tbb::parallel_for_each(by_scene.begin(), by_scene.end(), [&](auto& entry) {
+  std::vector<std::span<PreparedCell* const>> batches;
+  for (const auto& [scene, members] : by_scene)
+    for (std::size_t first = 0; first < members.size(); first += kTheoriesAtOnce)
+      batches.push_back(std::span(members).subspan(first, std::min(kTheoriesAtOnce, members.size() - first)));
+  tbb::parallel_for_each(batches.begin(), batches.end(), [&](const auto& members) {
     if (stop()) return;
-    const Scene& scene = *entry.first;
-    const std::vector<PreparedCell*>& members = entry.second;
+    const Scene& scene = *members.front()->scene;
     std::vector<TheoryQuery> queries;
     for (const PreparedCell* member : members)
       queries.push_back({member->kernel.get(), member->cell->quantity, member->range, &member->targets, &member->cell->name});

@@ -30,7 +30,7 @@ void expect_rays_fit(const Plan& plan, const std::function<bool(std::size_t)>& w
   for (std::size_t i = 0; i < plan.cells.size(); ++i) {
     if (!wanted(i)) continue;
     const Cell& cell = plan.cells[i];
-    const Component& set = plan.ray_sets[cell.rays];
+    const Component& set = *plan.ray_sets[cell.rays];
     const auto rays = static_cast<Real>(make_ray_set(set)->count());
     kept += rays * kBytesOfCell;
     if (built.insert({cell.medium, cell.rays}).second) kept += rays * kSharedBytes;

@@ -66,6 +66,7 @@ TestRecord test_record(const MeanTest& test, const Evidence& evidence) {
   record.log_e_low = log_e(Role::low);
   record.log_e_high = log_e(Role::high);
   record.log_e_beyond = log_e(Role::beyond);
+  if (test.group != MeanTest::kAllRays) return record;
   for (const auto& [role, bet] : test.bets)
     if (role == Role::fail && bet.side > 0) record.rates.insert(record.rates.end(), bet.rates.begin(), bet.rates.end());
   return record;

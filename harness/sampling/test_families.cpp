@@ -31,8 +31,8 @@ std::uint64_t mean_family(const Plan& plan) {
   std::uint64_t tests = 0;
   for (const Cell& cell : plan.cells)
     if (cell.verdict.enabled)
-      tests += channels_of(plan.media[cell.medium]) * outputs_per_channel(cell.quantity) *
-               (1 + possible_groups(plan.ray_sets[cell.rays])) * kClaims;
+      tests += channels_of(*plan.media[cell.medium]) * outputs_per_channel(cell.quantity) *
+               (1 + possible_groups(*plan.ray_sets[cell.rays])) * kClaims;
   return std::max<std::uint64_t>(1, tests);
 }
 

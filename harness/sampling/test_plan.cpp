@@ -220,7 +220,7 @@ class TestPlanner {
 
   void place(MeanTest& test, const ErrorLaw& law) {
     if (test.deterministic) {
-      test.basis = "deterministic";
+      test.basis = TestBasis::deterministic;
       return;
     }
     // A bias far beyond epsilon shows in the mean of all rays, or it is one of some groups that the others hide.
@@ -239,7 +239,7 @@ class TestPlanner {
     if (test.reference_error > 0.25 * test.epsilon)
       plan_.undecidable =
           fmt::format("the reference's own error {:.2g} is too coarse for epsilon {:.2g}", test.reference_error, test.epsilon);
-    if (test.deterministic || test.basis == "none") return;
+    if (test.deterministic || test.basis == TestBasis::none) return;
     plan_.planned = std::max(plan_.planned, test.planned);
     if (test.sure <= sure_) return;
     sure_ = test.sure;

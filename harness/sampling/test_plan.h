@@ -36,7 +36,7 @@ struct MeanTest {
   Real variance = 0;           ///< per sample, averaged over the rays, from theory or a pilot
   Real rounding = 0;           ///< errors up to here are rounding
   bool deterministic = false;  ///< no variance beyond rounding: every single sample must be right
-  std::string basis;           ///< see TestRecord
+  TestBasis basis = TestBasis::none;
   Real reference = 0;          ///< expected mean, averaged over the rays
   std::uint64_t planned = 0;   ///< samples per ray at which the test of an unbiased mean passes with a chance of .95
   std::uint64_t sure = 0;      ///< the same, if all tests of the configuration together pass with a chance of .999

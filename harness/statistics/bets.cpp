@@ -143,10 +143,10 @@ std::vector<std::pair<Role, Bet>> place_blind_bets(const ErrorLaw& law, int most
   return Placing(law, 0, 0, most_per_sum).blind();
 }
 
-std::string basis_of(const std::vector<std::pair<Role, Bet>>& bets) {
+TestBasis basis_of(const std::vector<std::pair<Role, Bet>>& bets) {
   bool betting = false, catoni = false;
   for (const auto& [role, bet] : bets) (bet.kind == Kind::betting ? betting : catoni) = true;
-  return betting && catoni ? "catoni+betting" : betting ? "betting" : catoni ? "catoni" : "none";
+  return betting && catoni ? TestBasis::both : betting ? TestBasis::betting : catoni ? TestBasis::catoni : TestBasis::none;
 }
 
 Real errors_to_pass(const std::vector<std::pair<Role, Bet>>& bets, const ErrorLaw& law, Real epsilon, Real alpha_pass,

@@ -43,7 +43,7 @@ std::vector<std::pair<Role, Bet>> place_bets(const ErrorLaw& law, Real epsilon, 
 std::vector<std::pair<Role, Bet>> place_blind_bets(const ErrorLaw& law, int most_per_sum);
 
 /// "betting", "catoni", "catoni+betting", or "none": what the bets rest on.
-std::string basis_of(const std::vector<std::pair<Role, Bet>>& bets);
+TestBasis basis_of(const std::vector<std::pair<Role, Bet>>& bets);
 
 /// Errors at which both one-sided wealths reach 1/alpha_pass with a normal quantile of `power` to spare, where there is no bias;
 /// infinite where nothing can be bet.

@@ -70,7 +70,7 @@ TEST(Bets, NoBetCanLoseMoreThanItHas) {
 
 TEST(Bets, WithoutARangeOrAVarianceToTrustThereIsNone) {
   EXPECT_TRUE(place_bets({.variance = 1e-9, .basis = ErrorLaw::Basis::none}, 0.01, kFirstLook, 64).empty());
-  EXPECT_EQ(basis_of({}), "none");
+  EXPECT_EQ(basis_of({}), TestBasis::none);
   EXPECT_FALSE(place_bets({.variance = 1e-9, .basis = ErrorLaw::Basis::pilot}, 0.01, kFirstLook, 64).empty());
 }
 

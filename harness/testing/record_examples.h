@@ -37,7 +37,7 @@ inline void make_consistent(CellRecord& record) {
     channel.rmse = std::abs(*channel.bias) * 1.1;
     channel.relative_variance = *channel.variance_theory / *channel.reference_rms / *channel.reference_rms;
     if (channel.kurtosis) channel.kurtosis = 3 + 1. / 3;
-    record.convergence[0].rmse[c] = std::sqrt(*channel.variance * (n - 1) / n + *channel.rmse * *channel.rmse);
+    record.convergence[0].channel[c].rmse = std::sqrt(*channel.variance * (n - 1) / n + *channel.rmse * *channel.rmse);
   }
 }
 
@@ -61,7 +61,7 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
     record.structure = StructureSize{7, 13, 9007199254740993};
     record.claims = "unbiased";
     record.range = "unit";
-    record.channels = record.medium.spectrum.empty() ? 1 : 3;
+    record.channels = record.medium->spectrum.empty() ? 1 : 3;
     record.status = Status::ok;
     record.rays = 1;
     record.samples = 10;
@@ -86,10 +86,10 @@ inline RunRecord example_results(const Plan& plan = example_plan()) {
     record.time->batches = {{1, next(), next()}, {64, record.time->ns_per_sample, record.time->mad}};
     record.squared_error_blocks = {next(), next()};
     for (const std::uint64_t samples : {std::uint64_t{1}, std::uint64_t{2}}) {
-      ConvergenceRecord step{samples, {}, {}};
+      ConvergenceRecord step{samples, {}};
       for (int c = 0; c < record.channels; ++c) {
-        step.rmse.push_back(next());
-        step.variance.push_back(c == 1 ? std::nullopt : std::optional(next()));
+        step.channel.emplace_back().rmse = next();
+        if (c != 1) step.channel.back().variance = next();
       }
       record.convergence.push_back(step);
     }

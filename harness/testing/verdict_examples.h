@@ -25,7 +25,7 @@ inline TestRecord passing(int channel = 0) {
   test.epsilon = 0.01;
   test.reference_error = 1e-9;
   test.variance = 0.25;
-  test.basis = "betting";
+  test.basis = TestBasis::betting;
   test.log_e_fail = -3;
   test.log_e_low = kNeeded + 1;
   test.log_e_high = kNeeded + 2;
@@ -51,7 +51,7 @@ inline TestRecord failing(int channel = 0) {
 /// One of samples without variance.
 inline TestRecord deterministic(Real largest_error, int channel = 0) {
   TestRecord test = passing(channel);
-  test.basis = "deterministic";
+  test.basis = TestBasis::deterministic;
   test.log_e_fail = test.log_e_low = test.log_e_high = 0;
   test.rates.clear();
   test.planned = 0;
@@ -85,7 +85,7 @@ inline CellRecord judged_cell(Real log_e_fail, Real log_e_within, const std::str
   test.reference = 0.5;
   test.mean_error = log_e_fail > 0 ? -0.01 : 0;
   test.variance = 0.25;
-  test.basis = "betting";
+  test.basis = TestBasis::betting;
   test.log_e_fail = log_e_fail;
   test.log_e_low = test.log_e_high = log_e_within;
   test.planned = 800;

@@ -17,7 +17,7 @@ constexpr Real kNoReliance = 0.01;
 /// Whether a proof about the mean takes a variance.
 bool takes_variance(const VerdictRecord& verdict) {
   return std::any_of(verdict.tests.begin(), verdict.tests.end(),
-                     [](const TestRecord& test) { return test.channel >= 0 && test.basis.find("catoni") != std::string::npos; });
+                     [](const TestRecord& test) { return test.channel >= 0 && test.takes_variance(); });
 }
 
 std::string violations_of(const CellRecord& record) {

@@ -35,7 +35,7 @@ TEST(Words, APilotMarksOnlyWhatTakesAVariance) {
   CellRecord record = passed();
   record.verdict->variance_basis = "pilot";
   EXPECT_EQ(marked_word(record), "PASS") << "bets on bounded samples take no variance";
-  for (const char* basis : {"catoni", "catoni+betting"}) {
+  for (const TestBasis basis : {TestBasis::catoni, TestBasis::both}) {
     record.verdict->tests[0].basis = basis;
     EXPECT_EQ(marked_word(record), "PASS (by pilot)");
   }
@@ -43,10 +43,10 @@ TEST(Words, APilotMarksOnlyWhatTakesAVariance) {
   EXPECT_EQ(marked_word(record), "PASS");
   // The lookups' variance says nothing of the mean's proof.
   record.verdict->variance_basis = "pilot";
-  record.verdict->tests[0].basis = "deterministic";
+  record.verdict->tests[0].basis = TestBasis::deterministic;
   record.verdict->tests.push_back(record.verdict->tests[0]);
   record.verdict->tests.back().channel = -1;
-  record.verdict->tests.back().basis = "catoni";
+  record.verdict->tests.back().basis = TestBasis::catoni;
   EXPECT_EQ(marked_word(record), "PASS");
 }
 
@@ -113,7 +113,7 @@ TEST(Words, AFindingIsWhatAPassProvesAndWhyOthersAreNone) {
 /// law is "variance from below".  A pilot's variance is not stated.
 TEST(Words, NoBiasIsProvenByAStatedVarianceThatIsRefuted) {
   for (const char* law : {"variance", "variance from below", "independence"})
-    for (const char* basis : {"catoni", "catoni+betting", "betting"})
+    for (const TestBasis basis : {TestBasis::catoni, TestBasis::both, TestBasis::betting})
       for (const char* from : {"analytic", "pilot"}) {
         CellRecord record = failed();
         record.verdict->variance_basis = from;
@@ -123,7 +123,7 @@ TEST(Words, NoBiasIsProvenByAStatedVarianceThatIsRefuted) {
         EXPECT_EQ(kind_of(record), Kind::fail);
         const std::string broken = fmt::format("law \"{}\" is broken (log E = 50.0)", law);
         const bool rests =
-            std::string(law) == "variance from below" && std::string(basis) != "betting" && std::string(from) == "analytic";
+            std::string(law) == "variance from below" && basis != TestBasis::betting && std::string(from) == "analytic";
         EXPECT_EQ(
             finding_of(record),
             "mean 0.49, expected 0.5: -2 %; " +
@@ -141,7 +141,7 @@ TEST(Words, AreTheSameInEveryOutput) {
   CellRecord pass = passed(), fail = failed();
   pass.verdict->bound_unproven = true;
   fail.verdict->variance_basis = "pilot";
-  fail.verdict->tests[0].basis = "catoni";
+  fail.verdict->tests[0].basis = TestBasis::catoni;
   RunRecord run = run_of({pass, fail, unjudged("no reference"), passed()});
   const Summary summary = summarise(run);
   const std::string passes = "PASS (bound not proven)", proves = "|bias| < 2 % of the mean";

@@ -296,7 +296,7 @@ TEST(Contract, StatisticsDoNotDependOnThreads) {
       EXPECT_EQ(one[i].draws, two[i].draws);
       ASSERT_EQ(one[i].convergence.size(), two[i].convergence.size());
       for (std::size_t k = 0; k < one[i].convergence.size(); ++k)
-        EXPECT_EQ(*one[i].convergence[k].rmse[c], *two[i].convergence[k].rmse[c]);
+        EXPECT_EQ(*one[i].convergence[k].channel[c].rmse, *two[i].convergence[k].channel[c].rmse);
     }
 }
 

@@ -27,7 +27,7 @@ std::string without_steps(const CellRecord& record) {
   for (const auto& [name, value] : record.cell.estimator.values)
     if (name != "steps") label += fmt::format("/{}:{}", name, to_text(value));
   if (record.cell.precision != Precision::float64) label += "/" + to_string(record.cell.precision);
-  return fmt::format("{}/{}/{}/{}", label, record.medium.label, to_string(record.cell.quantity), record.ray_set.label);
+  return fmt::format("{}/{}/{}/{}", label, record.medium->label, to_string(record.cell.quantity), record.ray_set->label);
 }
 
 struct Point {

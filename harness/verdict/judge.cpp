@@ -182,7 +182,7 @@ class Judging {
     verdict_.tests.clear();
     for (std::size_t i = 0; i < plan_.tests.size(); ++i) {
       verdict_.tests.push_back(test_record(plan_.tests[i], evidence_[i]));
-      if (plan_.tests[i].channel == MeanTest::kLookups && verdict_.counted_walks > 0) verdict_.tests.back().basis = "counted";
+      if (plan_.tests[i].channel == MeanTest::kLookups && verdict_.counted_walks > 0) verdict_.tests.back().basis = TestBasis::counted;
     }
     decide(verdict_, prepared_.targets.names);
     return verdict_;

@@ -98,7 +98,7 @@ TEST(Judging, APassTakesThePlannedSamples) {
     EXPECT_GE(record.verdict->samples_per_ray, record.verdict->planned);
     std::uint64_t planned = 1024;
     for (const TestRecord& test : record.verdict->tests)
-      if (test.basis != "counted") planned = std::max(planned, test.planned);
+      if (test.basis != TestBasis::counted) planned = std::max(planned, test.planned);
     EXPECT_LE(record.verdict->samples_per_ray, 3 * planned);
     EXPECT_EQ(record.verdict->proves.rfind("|bias| < ", 0), 0u) << record.verdict->proves;
   }

@@ -142,7 +142,7 @@ TEST(Planted, WhatTheMeanDoesNotShow) {
 
   // The variance of means of 2 is that of single samples; theory halves it.
   const CellRecord paired = run(scene_of("planted_paired_streams"));
-  EXPECT_NEAR(*paired.convergence[1].variance[0] / *paired.convergence[0].variance[0], 1, 0.02);
+  EXPECT_NEAR(*paired.convergence[1].channel[0].variance / *paired.convergence[0].channel[0].variance, 1, 0.02);
 }
 
 /// A sample of an honest tracker depends on its address alone; the batch streams' depends on the call it came in.

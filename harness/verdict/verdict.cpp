@@ -37,7 +37,7 @@ std::string measured_bias(const TestRecord& test) {
 /// Whether the bets against "mean error 0" took a variance that the tracker states and a law refutes.  They take it only where
 /// samples have no bound above, and there the law is the one from below.
 bool rests_on_a_false_variance(const TestRecord& test, const VerdictRecord& verdict) {
-  return verdict.variance_basis == "analytic" && test.basis.find("catoni") != std::string::npos &&
+  return verdict.variance_basis == "analytic" && test.takes_variance() &&
          std::any_of(verdict.laws.begin(), verdict.laws.end(),
                      [](const LawRecord& law) { return law.outcome == Outcome::fail && law.name == "variance from below"; });
 }
@@ -98,7 +98,7 @@ Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
   const bool precise = test.reference_error <= kReferenceShare * test.epsilon;
   return {.biased = test.log_e_fail >= to_fail,
           .beyond = test.log_e_beyond >= to_fail,
-          .within = precise && (test.basis == "counted" || (test.log_e_low >= to_pass && test.log_e_high >= to_pass))};
+          .within = precise && (test.basis == TestBasis::counted || (test.log_e_low >= to_pass && test.log_e_high >= to_pass))};
 }
 
 namespace {
