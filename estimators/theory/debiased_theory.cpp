@@ -211,7 +211,8 @@ std::optional<Real> unbiased_march_variance(const RayProfile& profile, int c, Re
     const auto [first, square] = pivoted_moments(rules.rule(pivots), chance, orders);
     // The mean is 1 where the rule resolves the law and no order is missing.  About 1, what is missing hardly counts.
     const Real found = std::max<Real>(0, square - 2 * first + mass);
-    if (std::abs(first - 1) < 1e-6 && (pivots == kMostPivots || std::abs(found - before) <= kResolved * found)) return scale * found;
+    if (std::abs(first - 1) < 1e-6 && (pivots == kMostPivots || std::abs(found - before) <= kResolved * found))
+      return scale * found;
     before = found;
   }
   return std::nullopt;

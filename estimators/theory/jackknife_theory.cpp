@@ -19,12 +19,16 @@ using Complex = std::complex<Real>;
 struct MarchLaw {
   std::vector<Law> parts;
   Real mean = 0, variance = 0;
+  Real reach = 0;  ///< bound on |X - E X|
 
   void add(Law law) {
     const Real m = law.mean();
     mean += m;
     for (Real& x : law.x) x -= m;
     variance += law.variance();
+    Real farthest = 0;
+    for (const Real x : law.x) farthest = std::max(farthest, std::abs(x));
+    reach += farthest;
     parts.push_back(std::move(law));
   }
 
@@ -56,15 +60,16 @@ Complex MarchLaw::log_characteristic(Complex s) const {
 }
 
 /// phi(real + i u) - 1 of a march for |u| <= 1, by its Chebyshev interpolant: phi is entire, and the march is asked for it often.
+/// n points are off by (reach/2)^n/n! of phi(real), relatively: 24 by 3e-17 up to a reach of 4.
 class Characteristic {
  public:
-  Characteristic(const MarchLaw& march, Real real) {
-    for (std::size_t k = 0; k < kPoints; ++k) {
-      const Real angle = std::numbers::pi * (static_cast<Real>(k) + .5) / kPoints;
+  Characteristic(const MarchLaw& march, Real real) : points_(march.reach <= 4 ? kMostPoints / 2 : kMostPoints) {
+    for (std::size_t k = 0; k < points_; ++k) {
+      const Real angle = std::numbers::pi * (static_cast<Real>(k) + .5) / static_cast<Real>(points_);
       u_[k] = std::cos(angle);
       weight_[k] = (k % 2 == 0 ? 1 : -1) * std::sin(angle);
-      const std::size_t opposite = kPoints - 1 - k;
-      const Complex value = k < kPoints / 2 ? complex_expm1(march.log_characteristic({real, u_[k]}))
+      const std::size_t opposite = points_ - 1 - k;
+      const Complex value = k < points_ / 2 ? complex_expm1(march.log_characteristic({real, u_[k]}))
                                             : Complex(real_[opposite], -imaginary_[opposite]);
       real_[k] = value.real();
       imaginary_[k] = value.imag();
@@ -72,19 +77,21 @@ class Characteristic {
   }
 
   Complex operator()(Real u) const {
-    const auto [real, imaginary, below] = sum_in_lanes<Real>(kPoints, [&](std::size_t k, auto pack) {
+    const auto [real, imaginary, below] = sum_in_lanes<Real>(points_, [&](std::size_t k, auto pack) {
       using Pack = decltype(pack);
       const Pack w = Pack::load(&weight_[k]) / (Pack(u) - Pack::load(&u_[k]));
       return std::array{w * Pack::load(&real_[k]), w * Pack::load(&imaginary_[k]), w};
     });
     if (std::isfinite(below)) return Complex(real, imaginary) / below;
-    const auto k = static_cast<std::size_t>(std::find(u_.begin(), u_.end(), u) - u_.begin());
+    const auto k =
+        static_cast<std::size_t>(std::find(u_.begin(), u_.begin() + static_cast<std::ptrdiff_t>(points_), u) - u_.begin());
     return {real_[k], imaginary_[k]};
   }
 
  private:
-  static constexpr std::size_t kPoints = 48;
-  std::array<Real, kPoints> u_, weight_, real_, imaginary_;
+  static constexpr std::size_t kMostPoints = 48;
+  std::size_t points_;
+  std::array<Real, kMostPoints> u_, weight_, real_, imaginary_;
 };
 
 /// Nodes on [0, 1] of a Gauss-Legendre rule.
