@@ -34,8 +34,12 @@ TransportScene scene_with(std::shared_ptr<const Medium> medium, std::shared_ptr<
   return scene;
 }
 
-/// Delta tracking by 3D-DDA with early exit [Amanatides and Woo 1987] in a medium whose frame is `map`.
+/// Delta tracking, or history-aware spectral tracking by averages [Kutz et al. 2017, Sec. 5], by 3D-DDA with early exit
+/// [Amanatides and Woo 1987].
+template <std::size_t kChannels>
 class PlainPaths {
+  using Value = std::array<Real, kChannels>;
+
  public:
   PlainPaths(std::shared_ptr<const Medium> medium, int cells)
       : medium_(std::move(medium)), box_(medium_->bounds()), map_(medium_->world_to_local()), cells_(cells) {
@@ -44,20 +48,21 @@ class PlainPaths {
       for (int y = 0; y < cells; ++y)
         for (int x = 0; x < cells; ++x) {
           const Vec3 lo = box_.lo + Vec3(x, y, z).cwiseProduct(size);
-          bounds_.push_back(medium_->extrema({lo - margin, lo + size + margin}).maximum[0]);
+          bounds_.push_back(medium_->extrema({lo - margin, lo + size + margin}).maximum.maxCoeff());
         }
   }
 
   Real path(Ray ray, Rng& rng) {
-    Real throughput = 1;
+    Value throughput;
+    throughput.fill(1);
     for (int scatterings = 0;; ++scatterings) {
       const Ray local = clipped(transformed(ray, map_), box_);
       Real t = local.begin;
-      if (!(local.length() > 0) || !collides(local, t, rng)) return throughput;
-      throughput *= kAlbedo;
+      if (!(local.length() > 0) || !collides(local, t, throughput, rng)) return throughput.back();
       if (scatterings + 1 >= kRouletteFrom) {
-        const Real probability = std::max(kRouletteFloor, std::min<Real>(1, throughput));
-        throughput /= probability;
+        const Real most = *std::max_element(throughput.begin(), throughput.end());
+        const Real probability = std::max(kRouletteFloor, std::min<Real>(1, most));
+        for (Real& weight : throughput) weight /= probability;
         if (!(rng.uniform() < probability)) return 0;
       }
       ray = {ray.at(t), Isotropic().sample(ray.direction, rng), 0, kInfinity};
@@ -67,7 +72,28 @@ class PlainPaths {
   std::uint64_t lookups = 0;
 
  private:
-  bool collides(const Ray& ray, Real& t, Rng& rng) {
+  /// Whether a tentative collision scatters; weighs the throughput.
+  static bool scatters(const Value& extinction, Real rate, Value& throughput, Rng& rng) {
+    if constexpr (kChannels == 1) {
+      if (!(rng.uniform() * rate < extinction[0])) return false;
+      throughput[0] *= kAlbedo;
+      return true;
+    } else {
+      Real scatter = 0, null = 0;
+      for (std::size_t c = 0; c < kChannels; ++c) {
+        scatter += throughput[c] * kAlbedo * extinction[c];
+        null += throughput[c] * (rate - extinction[c]);
+      }
+      const Real sum = scatter + null;
+      const bool chosen = rng.uniform() * sum < scatter;
+      const Real factor = sum / (rate * (chosen ? scatter : null));
+      for (std::size_t c = 0; c < kChannels; ++c)
+        throughput[c] *= factor * (chosen ? kAlbedo * extinction[c] : rate - extinction[c]);
+      return chosen;
+    }
+  }
+
+  bool collides(const Ray& ray, Real& t, Value& throughput, Rng& rng) {
     std::array<int, 3> cell, step;
     std::array<Real, 3> next, width;
     const Vec3 start = ray.at(ray.begin);
@@ -88,10 +114,10 @@ class PlainPaths {
       while (depth < rate * (end - t)) {
         t += depth / rate;
         const Vec3 p = ray.at(t);
-        Real extinction;
-        medium_->extinction({&p.x(), &p.y(), &p.z(), 1}, &extinction);
+        Value extinction;
+        medium_->extinction({&p.x(), &p.y(), &p.z(), 1}, extinction.data());
         ++lookups;
-        if (rng.uniform() * rate < extinction) return true;
+        if (scatters(extinction, rate, throughput, rng)) return true;
         depth = rng.exponential();
       }
       depth -= rate * (end - t);
@@ -109,8 +135,9 @@ class PlainPaths {
   std::vector<Real> bounds_;
 };
 
+template <std::size_t kChannels>
 void plain(benchmark::State& state, std::shared_ptr<const Medium> medium, int cells) {
-  PlainPaths paths(std::move(medium), cells);
+  PlainPaths<kChannels> paths(std::move(medium), cells);
   std::uint64_t drawn = 0;
   Real sum = 0;
   for ([[maybe_unused]] auto _ : state)
@@ -155,25 +182,27 @@ void composed(benchmark::State& state, const Source& tracker, std::shared_ptr<co
   const auto structure = [](const BuiltMedium& medium, const char* name, const ParameterValues& values) {
     return build_majorant({name, values, {}, {}}, medium).structure;
   };
+  const auto add = [&](const std::string& group, const std::shared_ptr<const BuiltMedium>& medium, const char* bounds,
+                       const ParameterValues& values, const auto& tracker) {
+    benchmark::RegisterBenchmark(fmt::format("{}/{}", group, tracker.second).c_str(), [=](benchmark::State& state) {
+      composed(state, tracker.first, medium->medium, structure(*medium, bounds, values));
+    });
+  };
+  const std::pair delta(EstimatorTemplate<DeltaTracking>(), "delta");
+  const std::pair spectral(EstimatorTemplate<SpectralTracking>(), "spectral");
   for (const int cells : {1, 16, 64}) {
-    const std::string group = fmt::format("paths through a grid of {:02}^3 bounds/", cells);
-    benchmark::RegisterBenchmark((group + "0 hand-written, grey").c_str(),
-                                 [=](benchmark::State& state) { plain(state, built->medium, cells); });
-    benchmark::RegisterBenchmark((group + "delta, grey").c_str(), [=](benchmark::State& state) {
-      composed(state, EstimatorTemplate<DeltaTracking>(), built->medium, structure(*built, "grid", {{"resolution", cells}}));
-    });
-    benchmark::RegisterBenchmark((group + "spectral, 4 channels").c_str(), [=](benchmark::State& state) {
-      composed(state, EstimatorTemplate<SpectralTracking>(), colour->medium, structure(*colour, "grid", {{"resolution", cells}}));
-    });
+    const std::string group = fmt::format("paths through a grid of {:02}^3 bounds", cells), coloured = "coloured " + group;
+    benchmark::RegisterBenchmark((group + "/0 hand-written").c_str(),
+                                 [=](benchmark::State& state) { plain<1>(state, built->medium, cells); });
+    add(group, built, "grid", {{"resolution", cells}}, delta);
+    benchmark::RegisterBenchmark((coloured + "/0 hand-written").c_str(),
+                                 [=](benchmark::State& state) { plain<4>(state, colour->medium, cells); });
+    add(coloured, colour, "grid", {{"resolution", cells}}, spectral);
   }
   for (const char* name : {"kd_tree", "octree", "vdb_nodes"}) {
-    const std::string group = fmt::format("paths through a {}/", name);
-    benchmark::RegisterBenchmark((group + "delta, grey").c_str(), [=](benchmark::State& state) {
-      composed(state, EstimatorTemplate<DeltaTracking>(), built->medium, structure(*built, name, {}));
-    });
-    benchmark::RegisterBenchmark((group + "spectral, 4 channels").c_str(), [=](benchmark::State& state) {
-      composed(state, EstimatorTemplate<SpectralTracking>(), colour->medium, structure(*colour, name, {}));
-    });
+    const std::string group = fmt::format("paths through a {}", name);
+    add(group, built, name, {}, delta);
+    add("coloured " + group, colour, name, {}, spectral);
   }
 });
 

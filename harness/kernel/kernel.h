@@ -191,7 +191,7 @@ class EstimatorSource {
   /// Null if there is none in this precision.  `lanes`: walks may run side by side in registers.
   virtual std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64,
                                                bool lanes = true) const = 0;
-  virtual Walkers walkers() const { return {}; }
+  virtual Walkers walkers(int /*channels*/) const { return {}; }
   /// The folder that paths among the parameters are relative to.
   virtual void locate(const std::string& /*folder*/) {}
   /// Of a tracker from outside of nullmark.

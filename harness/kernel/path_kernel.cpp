@@ -282,7 +282,7 @@ std::string why_no_paths(const EstimatorSource& estimator, const TransportScene&
   const Effects effects = asked_for(scene, general);
   if (!effects.heterogeneous) return "";
   if (!effects.scattering && !effects.emission) return why_not(*estimator.kernel(scene.medium->channels()), *scene.medium);
-  const Walkers walkers = estimator.walkers(), &shadow = scene.towards_environment;
+  const Walkers walkers = estimator.walkers(scene.medium->channels()), &shadow = scene.towards_environment;
   return effects.chromatic ? why_no_flights(walkers.chromatic, shadow.chromatic, scene)
                            : why_no_flights(walkers.grey, shadow.grey, scene);
 }
@@ -296,7 +296,7 @@ std::unique_ptr<const Kernel> make_path_kernel(const EstimatorSource& estimator,
     if (!effects.heterogeneous) return make_beer_lambert_kernel(scene);
     return make_absorption_kernel(scene, estimator.kernel(scene.medium->channels()));
   }
-  const Walkers walkers = estimator.walkers();
+  const Walkers walkers = estimator.walkers(scene.medium->channels());
   if (effects.chromatic) return make<Spectrum>(scene, effects, walkers.chromatic, scene.towards_environment.chromatic);
   return make<Real>(scene, effects, walkers.grey, scene.towards_environment.grey);
 }

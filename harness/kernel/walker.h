@@ -100,9 +100,10 @@ template <class E, class RayData>
 }
 
 /// Walks of an estimator.  If its RayData has a field `Value throughput`, this is set to the weight of the path so far, as
-/// history-aware collision probabilities require [Kutz et al. 2017, Sec. 5].
-template <template <class> class Estimator, class Value>
-class EstimatorWalker final : public Walker<Value> {
+/// history-aware collision probabilities require [Kutz et al. 2017, Sec. 5].  Inside it walks by `Value`; `Outside` may hold the
+/// same channels in another width.
+template <template <class> class Estimator, class Value, class Outside = Value>
+class EstimatorWalker final : public Walker<Outside> {
   using E = Estimator<Value>;
   using Traits = EstimatorTraits<E, Value>;
   using Along = typename Traits::RayData;
@@ -130,7 +131,7 @@ class EstimatorWalker final : public Walker<Value> {
 
   bool needs_optical_depth() const override { return Traits::needs_optical_depth(estimator_); }
 
-  void begin(WalkMemory& memory, const PathScene<Value>& path_scene, const Ray& world, const Ray& local) const override {
+  void begin(WalkMemory& memory, const PathScene<Outside>& path_scene, const Ray& world, const Ray& local) const override {
     State& state = static_cast<State&>(memory);
     Along& ray = state.ray;
     state.local = local;
@@ -141,31 +142,41 @@ class EstimatorWalker final : public Walker<Value> {
     ray.knots.clear();
     if (needs_knots()) sorted_knots(*path_scene.medium, local, ray.knots);
     prepare_ray<Traits>(ray, *path_scene.medium, *path_scene.extrema, world, state.local, path_scene.channels);
-    ray.set_albedo(path_scene.albedo, path_scene.albedo_field, world);
+    ray.set_albedo(inside(path_scene.albedo), path_scene.albedo_field, world);
     ray.draws_absorption = path_scene.draws_absorption;
     if constexpr (Traits::kPrepare) estimator_.prepare(ray);
   }
 
-  Event<Value> fly(WalkMemory& memory, const PathScene<Value>& path_scene, const Value& throughput, Rng& rng, EventBudget& budget,
-                   Counters& counters) const override {
+  Event<Outside> fly(WalkMemory& memory, const PathScene<Outside>& path_scene, const Outside& throughput, Rng& rng,
+                     EventBudget& budget, Counters& counters) const override {
     State& state = static_cast<State&>(memory);
-    if constexpr (requires { state.ray.throughput = throughput; }) state.ray.throughput = throughput;
+    if constexpr (requires { state.ray.throughput; }) state.ray.throughput = inside(throughput);
     [[maybe_unused]] const Flight at = walk(state, path_scene, rng, budget, counters);
-    if constexpr (Traits::kEvent) return estimator_.event(state.walk, state.ray, at);
+    if constexpr (Traits::kEvent) {
+      const Event<Value> event = estimator_.event(state.walk, state.ray, at);
+      return {event.kind, event.distance, Outside(event.weight)};
+    }
     return {};
   }
 
-  Value transmittance(WalkMemory& memory, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget,
-                      Counters& counters) const override {
+  Outside transmittance(WalkMemory& memory, const PathScene<Outside>& path_scene, Rng& rng, EventBudget& budget,
+                        Counters& counters) const override {
     State& state = static_cast<State&>(memory);
     if constexpr (requires { state.ray.throughput; }) state.ray.throughput = uniform_value<Value>(path_scene.channels, 1);
     walk(state, path_scene, rng, budget, counters);
-    return estimator_.result(state.walk, state.ray);
+    return Outside(estimator_.result(state.walk, state.ray));
   }
 
  private:
+  static Value inside(const Outside& value) {
+    if constexpr (std::is_same_v<Value, Outside>)
+      return value;
+    else
+      return load<Value>(value.data(), static_cast<int>(value.size()));
+  }
+
   /// Walks to the end of the ray or of the budget.
-  [[gnu::flatten]] Flight walk(State& state, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget,
+  [[gnu::flatten]] Flight walk(State& state, const PathScene<Outside>& path_scene, Rng& rng, EventBudget& budget,
                                Counters& counters) const {
     std::uint64_t lookups = 0;
     const Vec3 origin = state.local.origin, direction = state.local.direction;
