@@ -6,7 +6,7 @@ namespace nullmark {
 /// X(name, macro): what a CPU may lack, as __builtin_cpu_supports calls it, and what the compiler defines where it uses it.
 #define NULLMARK_CPU_FEATURES(X) \
   X("sse3", __SSE3__) X("ssse3", __SSSE3__) X("sse4.1", __SSE4_1__) X("sse4.2", __SSE4_2__) X("popcnt", __POPCNT__) \
-  X("sse4a", __SSE4A__) X("fma4", __FMA4__) X("xop", __XOP__) X("aes", __AES__) X("pclmul", __PCLMUL__) \
+  X("fma4", __FMA4__) X("xop", __XOP__) X("aes", __AES__) X("pclmul", __PCLMUL__) \
   X("avx", __AVX__) X("fma", __FMA__) X("bmi", __BMI__) X("bmi2", __BMI2__) X("avx2", __AVX2__) \
   X("avx512f", __AVX512F__) X("avx512cd", __AVX512CD__) X("avx512dq", __AVX512DQ__) X("avx512bw", __AVX512BW__) \
   X("avx512vl", __AVX512VL__) X("avx512ifma", __AVX512IFMA__) X("avx512vbmi", __AVX512VBMI__) \
