@@ -123,7 +123,7 @@ TEST(Run, TheShareOfWaitingIsWhatTheThreadsClockLacks) {
 /// Fewer samples share the cost of a walk through many cells, so each costs more.
 TEST(Run, TimesEveryNumberOfSamplesPerTraversal) {
   const Plan cells =
-      read_config(R"({"nullmark":"config/2","timing":{"repetitions":3,"seconds":0.02,"samples_per_traversal":[1,16,64]},
+      read_config(R"({"nullmark":"config/2","timing":{"repetitions":9,"seconds":0.005,"samples_per_traversal":[1,16,64]},
       "experiments":[{"name":"e","rays":"single","samples_per_ray":10,"verdict":{"enabled":false},
       "matrix":{"estimator":"ratio","medium":"linear","majorant":{"type":"grid","resolution":64}}}]})",
                   "test.json");
@@ -134,7 +134,7 @@ TEST(Run, TimesEveryNumberOfSamplesPerTraversal) {
   EXPECT_EQ(record.time->batches[1].samples_per_traversal, 16u);
   EXPECT_EQ(record.time->batches[2].ns_per_sample, record.time->ns_per_sample);
   EXPECT_GT(record.time->batches[0].ns_per_sample, 2 * record.time->ns_per_sample);
-  EXPECT_EQ(record.time->repetition_ns.size(), 3u);
+  EXPECT_EQ(record.time->repetition_ns.size(), 9u);
   ASSERT_TRUE(record.time->waiting);
 }
 
