@@ -78,6 +78,7 @@ class CommandLine {
     add_check();
     add_compare();
     add_gate();
+    add_history();
     add_report();
     add_list();
     add_schema();
@@ -242,6 +243,15 @@ class CommandLine {
     command->add_option("--markdown", gate_.markdown, "Also write a summary for a pull request");
   }
 
+  void add_history() {
+    CLI::App* command = add("history", "Show what changed over results of one configuration, in the order of their dates",
+                            [this] { return history_command(history_); });
+    command->add_option("RESULTS", history_.results, "Results files, in any order")->required();
+    command->add_option("--blocks", history_.blocks,
+                        "Folder of scripts/compare-builds for the programs of the last two: judge wall time as well");
+    command->add_flag("--json", history_.json, "Print JSON, with the figures of every cell in every result");
+  }
+
   void add_report() {
     CLI::App* command =
         add("report", "Write one self-contained page with tables and plots", [this] { return report_command(report_); });
@@ -342,6 +352,7 @@ class CommandLine {
   JudgeCommand judge_;
   ReplayCommand replay_;
   GateCommand gate_;
+  HistoryCommand history_;
   ReportCommand report_;
   ListCommand list_;
   ProceduralVdb volume_;

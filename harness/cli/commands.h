@@ -91,6 +91,14 @@ struct ReportCommand {
 };
 ExitCode report_command(const ReportCommand& command);
 
+/// `nullmark history`.
+struct HistoryCommand {
+  std::vector<std::string> results;
+  std::string blocks;  ///< folder of interleaved runs of the last two programs; empty: no wall time
+  bool json = false;
+};
+ExitCode history_command(const HistoryCommand& command);
+
 /// `nullmark list`.
 struct ListCommand {
   std::string what;  ///< "estimators", "media", "majorants", "rays" or "quantities"

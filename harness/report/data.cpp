@@ -9,6 +9,7 @@
 
 #include "harness/analysis/check.h"
 #include "harness/analysis/comparison.h"
+#include "harness/analysis/history.h"
 #include "harness/analysis/scaling.h"
 #include "harness/analysis/table_values.h"
 #include "harness/config/cell_names.h"
@@ -19,6 +20,7 @@
 #include "harness/model/names.h"
 #include "harness/report/cell_data.h"
 #include "harness/report/claims_text.h"
+#include "harness/report/history_text.h"
 #include "harness/report/images.h"
 #include "harness/report/warnings.h"
 #include "harness/run/provenance.h"
@@ -262,6 +264,17 @@ void add_comparisons(const std::vector<Comparison>& all, const Places& places, J
   }
 }
 
+/// Null where the results are no series of one configuration.
+Json history_or_null(const std::vector<RunRecord>& runs, const std::vector<std::string>& files) {
+  if (runs.size() < 2) return nullptr;
+  try {
+    const History history = history_of(runs, files);
+    return history.steps.empty() ? Json(nullptr) : history_json(history);
+  } catch (const InputError&) {
+    return nullptr;
+  }
+}
+
 }  // namespace
 
 ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::string>& files, const std::string& baseline,
@@ -298,6 +311,7 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
   json["matrix"] = matrix_json(all, places);
   json["scaling"] = scaling_json(runs, places);
   json["images"] = images.json();
+  json["history"] = history_or_null(runs, files);
   for (std::size_t run = 0; run < runs.size(); ++run) {
     if (const auto remark = version_remark(runs[run])) data.warnings.push_back(files[run] + ": " + *remark);
     const auto missing = images.missing().find(files[run]);
