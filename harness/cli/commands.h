@@ -23,6 +23,7 @@ struct RunCommand {
   std::string builds;     ///< "same" or "any"; empty: same
   int threads = 0;
   std::optional<double> time_budget;
+  std::vector<std::string> columns;  ///< of the table; empty: all
   bool resume = false, force = false, dry_run = false, no_timing = false;
   bool allow_foreign = false;  ///< as NULLMARK_ALLOW_FOREIGN=1: configurations may run code from outside
   std::vector<std::string> command_line;

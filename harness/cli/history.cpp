@@ -22,7 +22,7 @@ ExitCode history_command(const HistoryCommand& command) {
   const History history = history_of(std::move(runs), command.results, blocks);
   if (!history.steps.empty() && command.json)
     fmt::print("{}\n", history_json(history).dump(2, ' ', false, Json::error_handler_t::replace));
-  if (!history.steps.empty() && !command.json) tell("{}", history_text(history, terminal_width()));
+  if (!history.steps.empty() && !command.json) tell("{}", wrapped(history_text(history, terminal_width()), terminal_width()));
   for (const std::string& warning : history.warnings) notice("nullmark: warning: {}\n", warning);
   if (history.steps.empty()) notice("nullmark: all files hold the same results; nothing to compare\n");
   return history.steps.empty() || history.steps.back().compared == 0 ? ExitCode::nothing_ran : ExitCode::ok;

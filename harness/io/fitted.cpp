@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <numeric>
 
 #include "harness/io/json_input.h"
 #include "harness/io/text.h"
@@ -75,21 +76,53 @@ std::string fitted(Lines lines, std::size_t left, std::size_t width, std::vector
   return aligned(lines, left);
 }
 
-Lines chosen_columns(const Lines& lines, const std::vector<std::string>& words) {
-  const std::vector<std::string>& headings = lines[0];
-  std::vector<std::size_t> places = {0};
-  for (const std::string& word : words) {
-    const auto at = std::find(headings.begin(), headings.end(), word);
-    if (at == headings.end())
-      throw InputError(fmt::format("--columns: there is no column \"{}\"; expected some of {}", word, fmt::join(headings, ", ")));
-    if (const auto place = static_cast<std::size_t>(at - headings.begin()); place > 0) places.push_back(place);
+std::string shaped(const Lines& lines, std::size_t left, std::size_t kept, const TableShape& shape,
+                   std::vector<std::string>& left_out) {
+  if (shape.columns.empty()) return fitted(lines, left, shape.width, left_out);
+  std::vector<std::size_t> places(kept);
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  for (const std::string& word : shape.columns) {
+    const auto place = static_cast<std::size_t>(std::find(lines[0].begin(), lines[0].end(), word) - lines[0].begin());
+    if (place >= kept && place < lines[0].size()) places.push_back(place);
   }
   Lines chosen;
   for (const std::vector<std::string>& line : lines) {
     std::vector<std::string>& one = chosen.emplace_back();
     for (const std::size_t place : places) one.push_back(line[place]);
   }
-  return chosen;
+  return fitted(std::move(chosen), kept, shape.width, left_out);
+}
+
+std::string left_out_line(const std::vector<std::string>& left_out) {
+  return left_out.empty() ? "" : fmt::format("no room for columns: {}; --columns chooses some\n", fmt::join(left_out, ", "));
+}
+
+void expect_columns(const std::vector<std::string>& words, const std::vector<std::string>& headings) {
+  for (const std::string& word : words)
+    if (std::find(headings.begin(), headings.end(), word) == headings.end())
+      throw InputError(fmt::format("--columns: there is no \"{}\"; expected some of {}", word, fmt::join(headings, ",")));
+}
+
+std::string wrapped(const std::string& text, std::size_t width) {
+  constexpr const char* kIndent = "    ";
+  constexpr std::size_t kLeastWidth = 20;
+  if (width < kLeastWidth) return text;
+  std::string result;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    std::string line = text.substr(at, end - at);
+    while (line.size() > width) {
+      // A word that is too long stays whole.
+      std::size_t space = line.rfind(' ', width);
+      if (space == std::string::npos || line.find_first_not_of(' ') > space) space = line.find(' ', width);
+      if (space == std::string::npos) break;
+      result += line.substr(0, space) + "\n";
+      line = kIndent + line.substr(space + 1);
+    }
+    result += line + (end < text.size() ? "\n" : "");
+    at = end + 1;
+  }
+  return result;
 }
 
 std::size_t terminal_width() {

@@ -1,6 +1,7 @@
 #include "harness/report/data.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -283,14 +284,14 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
   Json& json = data.json;
   ReportImages images;
   Places places;
-  std::string title;
+  std::vector<std::string> names;
   std::set<std::string> shown;
   json["runs"] = Json::array();
   json["cells"] = Json::array();
   json["tables"] = Json::array();
   json["claims"] = Json::array();
   for (std::size_t run = 0; run < runs.size(); ++run) {
-    title += (title.empty() ? "" : " + ") + runs[run].name;
+    if (std::find(names.begin(), names.end(), runs[run].name) == names.end()) names.push_back(runs[run].name);
     const Summary summary = summarise(runs[run]);
     json["runs"].push_back(run_json(runs[run], summary, files[run]));
     shown.merge(credits(runs[run]));
@@ -304,7 +305,7 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
   }
   const std::vector<Comparison> all = comparisons(runs, baseline);
   add_comparisons(all, places, json);
-  json["title"] = title;
+  json["title"] = fmt::format("{}", fmt::join(names, " + "));
   json["version"] = this_version();
   json["command"] = command;
   json["credits"] = shown;
