@@ -16,10 +16,12 @@
 #include "harness/cli/shell_help.h"
 #include "harness/config/schema.h"
 #include "harness/io/file_io.h"
+#include "harness/io/fitted.h"
 #include "harness/io/json_input.h"
 #include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
+#include "harness/io/shell_word.h"
 #include "harness/io/text.h"
 #include "harness/performance_gate/required.h"
 #include "harness/report/check_text.h"
@@ -78,6 +80,7 @@ class CommandLine {
     add_check();
     add_compare();
     add_gate();
+    add_history();
     add_report();
     add_list();
     add_schema();
@@ -173,13 +176,14 @@ class CommandLine {
       RunRecord run = load_all({file_})[0];
       const Summary summary = summarise(run, strict_);
       if (!junit_.empty()) write_atomically(junit_, junit(run, file_));
-      warn(file_, version_remark(run));
-      warn(file_, busy_remark(run));
       if (!markdown_.empty())
         write_atomically(markdown_, fmt::format("{}{}{}", summary_markdown(run, summary, file_), cases_ ? "\n" : "",
                                                 cases_ ? stability_markdown(run) : ""));
-      if (cases_) tell("{}\n", stability_text(run));
-      tell("{}", summary_text(run, summary, all_));
+      const std::string all = fmt::format("{} check --all {}", shell_word(run_.command_line[0]), shell_word(file_));
+      tell("{}", wrapped(summary_text(run, summary, all_, all), terminal_width()));
+      if (cases_) tell("\n{}", stability_text(run));
+      warn(file_, version_remark(run));
+      warn(file_, busy_remark(run));
       return summary.exit;
     });
     command->add_option("RESULTS", file_, "Results file")->required();
@@ -195,23 +199,29 @@ class CommandLine {
   void add_compare() {
     CLI::App* command = add("compare", "Rank estimators by what accuracy costs in time", [this] {
       refuse_overwriting_others(files_, {{markdown_, "### nullmark compare"}, {latex_, kLatexBeginning}});
+      expect_columns(columns_, comparison_columns());
       const std::vector<RunRecord> runs = load_all(files_);
-      const std::string ranking = compare_text(runs, baseline_, paired_);
+      const std::string ranking = compare_text(runs, baseline_, paired_, {terminal_width(), columns_});
       if (ranking.empty()) {
         notice("nullmark: no cell of these results was sampled, or they are pairs, which are not ranked; nothing to compare\n");
         return ExitCode::nothing_ran;
       }
+      tell("{}", wrapped(ranking, terminal_width()));
       for (std::size_t i = 0; i < runs.size(); ++i) {
         warn(files_[i], version_remark(runs[i]));
         warn(files_[i], busy_remark(runs[i]));
       }
-      tell("{}", ranking);
       if (!markdown_.empty()) write_atomically(markdown_, compare_markdown(runs, baseline_, paired_));
       if (!latex_.empty()) write_atomically(latex_, compare_latex(runs, baseline_));
       return ExitCode::ok;
     });
     command->add_option("RESULTS", files_, "Results files")->required();
     command->add_option("--baseline", baseline_, "Estimator to compare the others with");
+    command
+        ->add_option("--columns", columns_,
+                     "Columns to show, with commas: " + fmt::format("{}", fmt::join(comparison_columns(), ",")))
+        ->delimiter(',')
+        ->allow_extra_args(false);
     command->add_flag("--paired", paired_, "Also compare mean squared errors on common random streams");
     command->add_option("--markdown", markdown_, "Also write the tables for a pull request");
     command->add_option("--latex", latex_, "Also write the tables for a paper (LaTeX, packages booktabs and graphicx)");
@@ -240,6 +250,15 @@ class CommandLine {
     command->add_flag("--update", gate_.update, "Make the results the baseline")->excludes(blocks)->excludes(require);
     command->add_option("--junit", gate_.junit, "Also write a JUnit report");
     command->add_option("--markdown", gate_.markdown, "Also write a summary for a pull request");
+  }
+
+  void add_history() {
+    CLI::App* command = add("history", "Show what changed over results of one configuration, in the order of their dates",
+                            [this] { return history_command(history_); });
+    command->add_option("RESULTS", history_.results, "Results files, in any order")->required();
+    command->add_option("--blocks", history_.blocks,
+                        "Folder of scripts/compare-builds for the programs of the last two: judge wall time as well");
+    command->add_flag("--json", history_.json, "Print JSON, with the figures of every cell in every result");
   }
 
   void add_report() {
@@ -342,10 +361,11 @@ class CommandLine {
   JudgeCommand judge_;
   ReplayCommand replay_;
   GateCommand gate_;
+  HistoryCommand history_;
   ReportCommand report_;
   ListCommand list_;
   ProceduralVdb volume_;
-  std::vector<std::string> files_;
+  std::vector<std::string> files_, columns_;
   std::string file_, baseline_, builds_, schema_, format_, output_, junit_, markdown_, latex_, word_;
   bool force_ = false, paired_ = false, cases_ = false, all_ = false, strict_ = false;
 };

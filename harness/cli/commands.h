@@ -23,6 +23,7 @@ struct RunCommand {
   std::string builds;     ///< "same" or "any"; empty: same
   int threads = 0;
   std::optional<double> time_budget;
+  std::vector<std::string> columns;  ///< of the table; empty: all
   bool resume = false, force = false, dry_run = false, no_timing = false;
   bool allow_foreign = false;  ///< as NULLMARK_ALLOW_FOREIGN=1: configurations may run code from outside
   std::vector<std::string> command_line;
@@ -90,6 +91,14 @@ struct ReportCommand {
   std::string figures, markdown;  ///< folder and file; empty: none
 };
 ExitCode report_command(const ReportCommand& command);
+
+/// `nullmark history`.
+struct HistoryCommand {
+  std::vector<std::string> results;
+  std::string blocks;  ///< folder of interleaved runs of the last two programs; empty: no wall time
+  bool json = false;
+};
+ExitCode history_command(const HistoryCommand& command);
 
 /// `nullmark list`.
 struct ListCommand {

@@ -5,6 +5,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/config/schema.h"
+#include "harness/io/fitted.h"
 #include "harness/io/notice.h"
 #include "harness/model/names.h"
 
@@ -72,23 +73,25 @@ std::string range_text(const Json& parameter) {
 }
 
 void print_text(const Json& list) {
+  const std::size_t width = terminal_width();
+  const auto tell_line = [&](const std::string& line) { tell("{}", wrapped(line, width)); };
   for (const Json& entry : list) {
-    tell("{}\n    {}\n", plain(entry["name"]), plain(entry["summary"]));
-    if (entry.contains("source") && entry["source"] != "") tell("    source: {}\n", plain(entry["source"]));
+    tell_line(fmt::format("{}\n    {}\n", plain(entry["name"]), plain(entry["summary"])));
+    if (entry.contains("source") && entry["source"] != "") tell_line(fmt::format("    source: {}\n", plain(entry["source"])));
     if (entry.contains("claims")) {
       std::string claims;
       for (const auto& [quantity, claim] : entry["claims"].items())
         claims += fmt::format("{}{}: {}", claims.empty() ? "" : ", ", quantity, plain(claim));
-      tell("    {}; range of samples: {}{}{}\n", claims, plain(entry["range"]),
-           entry["needs_bound"].get<bool>() ? "; needs a majorant that bounds the extinction" : "",
-           entry["lanes"].get<bool>() ? "; runs in lanes, in double and in float" : "");
+      tell_line(fmt::format("    {}; range of samples: {}{}{}\n", claims, plain(entry["range"]),
+                            entry["needs_bound"].get<bool>() ? "; needs a majorant that bounds the extinction" : "",
+                            entry["lanes"].get<bool>() ? "; runs in lanes, in double and in float" : ""));
     }
     if (!entry.contains("parameters")) continue;
     for (const Json& parameter : entry["parameters"]) {
       const std::string unit = parameter.contains("unit") ? fmt::format(" {}", plain(parameter["unit"])) : "";
       const std::string range = range_text(parameter);
-      tell("    {} = {}{}{}: {}\n", plain(parameter["name"]), parameter["default"].dump(), unit,
-           range.empty() ? "" : fmt::format(" ({})", range), plain(parameter["description"]));
+      tell_line(fmt::format("    {} = {}{}{}: {}\n", plain(parameter["name"]), parameter["default"].dump(), unit,
+                            range.empty() ? "" : fmt::format(" ({})", range), plain(parameter["description"])));
     }
   }
 }

@@ -5,6 +5,7 @@
 #include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
+#include "harness/io/shell_word.h"
 #include "harness/model/program_name.h"
 #include "harness/report/comparison_text.h"
 #include "harness/report/data.h"
@@ -20,15 +21,15 @@ ExitCode report_command(const ReportCommand& command) {
   std::vector<RunRecord> runs;
   for (const std::string& file : command.results) runs.push_back(read_results(read_file(file), file));
   std::string words = program_name() + " report";
-  for (const std::string& file : command.results) words += " " + file;
-  const ReportData data = report_data(runs, command.results, command.baseline, words + " -o " + command.output);
-  for (const std::string& warning : data.warnings) notice("nullmark: warning: {}\n", warning);
-  for (std::size_t i = 0; i < runs.size(); ++i)
-    if (const auto remark = busy_remark(runs[i])) notice("nullmark: warning: {}: {}\n", command.results[i], *remark);
+  for (const std::string& file : command.results) words += " " + shell_word(file);
+  const ReportData data = report_data(runs, command.results, command.baseline, words + " -o " + shell_word(command.output));
   write_atomically(command.output, report_page(data.json));
   if (!command.markdown.empty()) write_atomically(command.markdown, compare_markdown(runs, command.baseline, true));
   notice("report: {}\n", command.output);
   if (!command.figures.empty()) notice("figures: {} in {}\n", write_figures(command.output, command.figures), command.figures);
+  for (const std::string& warning : data.warnings) notice("nullmark: warning: {}\n", warning);
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    if (const auto remark = busy_remark(runs[i])) notice("nullmark: warning: {}: {}\n", command.results[i], *remark);
   return ExitCode::ok;
 }
 

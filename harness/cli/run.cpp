@@ -21,6 +21,7 @@
 #include "harness/config/config.h"
 #include "harness/foreign/consent.h"
 #include "harness/io/file_io.h"
+#include "harness/io/fitted.h"
 #include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
@@ -242,14 +243,16 @@ RunObserver observer_of(Journal* journal, Progress& progress, RunContext& contex
   return observer;
 }
 
-void tell_results(const RunRecord& run, const std::string& output) {
-  tell("{}", results_tables(run));
+void tell_results(const RunRecord& run, const std::string& output, const std::vector<std::string>& columns) {
+  const std::size_t width = terminal_width();
+  tell("{}", wrapped(results_tables(run, {width, columns}), width));
   notice("results: {}\n", output);
   if (const auto remark = busy_remark(run)) notice("nullmark: warning: {}\n", *remark);
 }
 
 /// To the file, whose journal is done with then, or to standard output where there is no journal.
-ExitCode conclude_run(const Plan& plan, Earlier cells, const RunContext& context, const std::string& output, Journal* journal) {
+ExitCode conclude_run(const Plan& plan, Earlier cells, const RunContext& context, const std::string& output, Journal* journal,
+                      const std::vector<std::string>& columns) {
   std::vector<CellRecord> records;
   records.reserve(cells.size());
   while (!cells.empty()) records.push_back(std::move(cells.extract(cells.begin()).mapped()));
@@ -257,7 +260,7 @@ ExitCode conclude_run(const Plan& plan, Earlier cells, const RunContext& context
   if (journal) {
     write_results(run, output);
     journal->remove();
-    tell_results(run, output);
+    tell_results(run, output, columns);
   } else {
     write_results(run, [](std::string_view part) { fmt::print("{}", part); });
   }
@@ -267,6 +270,7 @@ ExitCode conclude_run(const Plan& plan, Earlier cells, const RunContext& context
 }  // namespace
 
 ExitCode run_command(const RunCommand& command) {
+  expect_columns(command.columns, results_columns());
   take_consent(command.allow_foreign);
   const std::vector<ConfigSource> sources = load_configs(command.configs);
   const std::optional<std::uint64_t> seed = requested_seed(command.seed);
@@ -308,7 +312,7 @@ ExitCode run_command(const RunCommand& command) {
     for (std::size_t i = 0, next = 0; i < plan.cells.size(); ++i)
       if (selected[i] && next < records.size()) earlier[i] = placed(std::move(records[next++]), plan.cells[i]);
     std::vector<CellRecord>().swap(records);
-    return conclude_run(plan, std::move(earlier), context, output, journal.get());
+    return conclude_run(plan, std::move(earlier), context, output, journal.get(), command.columns);
   };
   return watched_run(plan, selected, finished, options, observer_of(journal.get(), *progress, context), conclude);
 }

@@ -1,9 +1,12 @@
 #include "harness/cli/sampling_options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+
+#include "harness/report/results_tables.h"
 
 namespace nullmark {
 namespace {
@@ -43,6 +46,11 @@ void declare_run(CLI::App& command, RunCommand& asked) {
           },
           "SECONDS"));
   add_consent(command, asked.allow_foreign);
+  command
+      .add_option("--columns", asked.columns,
+                  fmt::format("Columns of the table, with commas: {}", fmt::join(results_columns(), ",")))
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command.add_flag("--no-timing", asked.no_timing, "Skip timing; statistics only");
 }
 

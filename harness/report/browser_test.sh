@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# browser_test.sh PROGRAM FOLDER   has PROGRAM report on browser_test.json, on a part of it without timing and on many_cells.json,
-# and a real browser read the pages
+# browser_test.sh PROGRAM FOLDER   has PROGRAM report on browser_test.json, on a part of it without timing, on many_cells.json and
+# on a history from which cells went, and a real browser read the pages
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 program=$1 folder=$2
@@ -14,3 +14,9 @@ for name in browser_test untimed many_cells; do
   /usr/bin/python3 -B "$here/browser_test.py" "$folder/$name.html" "$folder/$name.json" || code=$?
   [ "$code" -eq 0 ] || exit "$code"
 done
+
+sed 's/"optical_depth": \[0.5, 1, 2, 4\]/"optical_depth": [0.5, 1, 2]/' "$here/browser_test.json" >"$folder/fewer_depths.config.json"
+"$program" run "$here/browser_test.json" --no-timing -o "$folder/all_depths.json" --force >/dev/null 2>&1
+"$program" run "$folder/fewer_depths.config.json" --no-timing -o "$folder/fewer_depths.json" --force >/dev/null 2>&1
+"$program" report "$folder/all_depths.json" "$folder/fewer_depths.json" -o "$folder/history.html"
+/usr/bin/python3 -B "$here/browser_test.py" "$folder/history.html" "$folder/all_depths.json" "$folder/fewer_depths.json"

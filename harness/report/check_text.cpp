@@ -146,25 +146,26 @@ std::string group_line(const std::string& word, const std::vector<const CellReco
 }
 
 /// The cells that nobody need look at one by one, where they are many: a line for each word.
-std::string grouped_lines(const RunRecord& run, bool strict) {
+std::string grouped_lines(const RunRecord& run, bool strict, const std::string& command) {
   std::map<std::pair<Kind, std::string>, std::vector<const CellRecord*>> groups;
   for (const CellRecord& record : run.cells)
     if (is_listed(record) && !needs_attention(kind_of(record), strict))
       groups[{kind_of(record), word_of_group(record) + reason_of_group(record)}].push_back(&record);
   std::string text;
   for (const auto& [key, cells] : groups) text += cells.size() == 1 ? cell_line(*cells[0]) : group_line(key.second, cells);
-  return text + "`nullmark check --all` lists each of them\n";
+  return text + fmt::format("each of them: {}\n", command);
 }
 
 }  // namespace
 
-std::string summary_text(const RunRecord& run, const Summary& summary, bool all) {
+std::string summary_text(const RunRecord& run, const Summary& summary, bool all, const std::string& command) {
   constexpr std::ptrdiff_t kFew = 40;
   const auto quiet = std::count_if(run.cells.begin(), run.cells.end(), [&](const CellRecord& record) {
     return is_listed(record) && !needs_attention(kind_of(record), summary.strict);
   });
   const bool grouped = !all && quiet > kFew;
-  std::string text = grouped ? grouped_lines(run, summary.strict) : "";
+  std::string text = fmt::format("{}\n{}\n", counts(run, summary), families(run));
+  if (grouped) text += grouped_lines(run, summary.strict, command);
   for (const Kind kind : {Kind::pass, Kind::agree, Kind::violated, Kind::expected_open, Kind::not_run, Kind::unexpected_open,
                           Kind::error, Kind::differ, Kind::fail})
     for (const CellRecord& record : run.cells)
@@ -173,7 +174,7 @@ std::string summary_text(const RunRecord& run, const Summary& summary, bool all)
   for (const OrderFit& fit : summary.orders) text += fmt::format("ORDER: {}\n", order_line(fit));
   if (!summary.findings.empty()) text += findings_text(summary.findings);
   for (const std::string& line : remarks_of(run, summary)) text += line + "\n";
-  return text + fmt::format("{}\n{}\n", counts(run, summary), families(run));
+  return text;
 }
 
 std::string summary_markdown(const RunRecord& run, const Summary& summary, const std::string& file) {

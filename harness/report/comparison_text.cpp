@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "harness/analysis/comparison.h"
 #include "harness/io/text.h"
@@ -63,9 +64,10 @@ bool any_alone(const Comparison& comparison) {
 
 std::vector<Line> ranking(const Comparison& comparison) {
   const bool floors = any_floor(comparison), alone = any_alone(comparison);
-  Line heading = {"", "estimator", "verdict", "variance", "variance x lookups", "variance x ns"};
+  // Costs come first: a narrow terminal leaves out what is on the right.
+  Line heading = {"",         "estimator",          "verdict",      "s to 1 %", "s to 0.1 %", "/ baseline",
+                  "variance", "variance x lookups", "variance x ns"};
   if (alone) heading.emplace_back("alone");
-  heading.insert(heading.end(), {"s to 1 %", "s to 0.1 %", "/ baseline"});
   if (floors) heading.insert(heading.end(), {"floor", "cheaper than the best unbiased until"});
   std::vector<Line> lines = {heading};
   for (const RankedCell& ranked : comparison.cells) {
@@ -73,11 +75,13 @@ std::vector<Line> ranking(const Comparison& comparison) {
     Line line = {rank_shown(ranked),
                  ranked.label,
                  standing_of(*ranked.record),
+                 time_shown(ranked, 0),
+                 time_shown(ranked, 1),
+                 shown(ranked.relative),
                  cost ? shown(cost->variance) : "-",
                  cost ? shown(cost->variance_x_lookups) : "-",
                  cost ? shown(cost->variance_x_ns) : "-"};
     if (alone) line.push_back(cost ? shown(cost->variance_x_ns_alone) : "-");
-    line.insert(line.end(), {time_shown(ranked, 0), time_shown(ranked, 1), shown(ranked.relative)});
     if (floors) line.insert(line.end(), {floor_shown(ranked), break_even_shown(comparison, ranked)});
     lines.push_back(std::move(line));
   }
@@ -167,24 +171,54 @@ std::string seam_lines(const Comparison& comparison) {
   return text;
 }
 
+/// Who is fastest where: "fastest to 1 %, alone or tied, in 3 scenes: ratio in 2, delta in 1".
+std::string fastest_line(const std::vector<Comparison>& all) {
+  constexpr std::size_t kNamed = 4;
+  std::map<std::string, std::size_t> wins;
+  for (const Comparison& comparison : all)
+    for (const RankedCell& ranked : comparison.cells)
+      if (ranked.rank == std::size_t{1}) ++wins[ranked.label];
+  const std::string scenes = fmt::format("{} scene{}", all.size(), all.size() == 1 ? "" : "s");
+  if (wins.empty()) return fmt::format("no tracker is ranked in {}: none was timed, or none reaches 1 %\n\n", scenes);
+  std::vector<std::pair<std::string, std::size_t>> order(wins.begin(), wins.end());
+  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::vector<std::string> named;
+  for (std::size_t i = 0; i < std::min(kNamed, order.size()); ++i)
+    named.push_back(fmt::format("{} in {}", order[i].first, order[i].second));
+  return fmt::format("fastest to 1 %, alone or tied, of {}: {}{}\n\n", scenes, fmt::join(named, ", "),
+                     order.size() > kNamed ? fmt::format(" and {} more", order.size() - kNamed) : "");
+}
+
 std::string baseline_line(const Comparison& comparison) {
   return comparison.baseline ? fmt::format("baseline: {}", comparison.cells[*comparison.baseline].label) : "no baseline here";
 }
 
 }  // namespace
 
-std::string compare_text(const std::vector<RunRecord>& runs, const std::string& baseline, bool paired) {
-  std::string text;
-  for (const Comparison& comparison : comparisons(runs, baseline)) {
-    text += fmt::format("{}\n{}", comparison.name, aligned(ranking(comparison), 2));
+const std::vector<std::string>& comparison_columns() {
+  static const std::vector<std::string> kColumns = {"verdict",       "s to 1 %",
+                                                    "s to 0.1 %",    "/ baseline",
+                                                    "variance",      "variance x lookups",
+                                                    "variance x ns", "alone",
+                                                    "floor",         "cheaper than the best unbiased until"};
+  return kColumns;
+}
+
+std::string compare_text(const std::vector<RunRecord>& runs, const std::string& baseline, bool paired, const TableShape& shape) {
+  const std::vector<Comparison> all = comparisons(runs, baseline);
+  std::string text = all.empty() ? "" : fastest_line(all);
+  std::vector<std::string> left_out;
+  for (const Comparison& comparison : all) {
+    text += fmt::format("{}\n{}", comparison.name, shaped(ranking(comparison), 3, 2, shape, left_out));
     text += amortised_line(comparison) + unproven_line(comparison) + seam_lines(comparison) + remark_lines(comparison);
-    if (paired && !comparison.pairings.empty()) text += aligned(pairs(comparison), 1);
+    if (paired && !comparison.pairings.empty()) text += fitted(pairs(comparison), 1, shape.width, left_out);
     if (paired) text += not_paired(comparison);
     text += baseline_line(comparison) + "\n\n";
   }
   for (const RunRecord& run : runs)
-    for (const auto& [title, lines] : configured_tables(run)) text += fmt::format("{}\n{}\n", title, aligned(lines, 1));
-  return text;
+    for (const auto& [title, lines] : configured_tables(run))
+      text += fmt::format("{}\n{}\n", title, fitted(lines, 1, shape.width, left_out));
+  return text + left_out_line(left_out);
 }
 
 std::string compare_latex(const std::vector<RunRecord>& runs, const std::string& baseline) {

@@ -1,6 +1,7 @@
 #include "harness/report/data.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,7 @@
 
 #include "harness/analysis/check.h"
 #include "harness/analysis/comparison.h"
+#include "harness/analysis/history.h"
 #include "harness/analysis/scaling.h"
 #include "harness/analysis/table_values.h"
 #include "harness/config/cell_names.h"
@@ -19,6 +21,7 @@
 #include "harness/model/names.h"
 #include "harness/report/cell_data.h"
 #include "harness/report/claims_text.h"
+#include "harness/report/history_text.h"
 #include "harness/report/images.h"
 #include "harness/report/warnings.h"
 #include "harness/run/provenance.h"
@@ -262,6 +265,17 @@ void add_comparisons(const std::vector<Comparison>& all, const Places& places, J
   }
 }
 
+/// Null where the results are no series of one configuration.
+Json history_or_null(const std::vector<RunRecord>& runs, const std::vector<std::string>& files) {
+  if (runs.size() < 2) return nullptr;
+  try {
+    const History history = history_of(runs, files);
+    return history.steps.empty() ? Json(nullptr) : history_json(history);
+  } catch (const InputError&) {
+    return nullptr;
+  }
+}
+
 }  // namespace
 
 ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::string>& files, const std::string& baseline,
@@ -270,14 +284,14 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
   Json& json = data.json;
   ReportImages images;
   Places places;
-  std::string title;
+  std::vector<std::string> names;
   std::set<std::string> shown;
   json["runs"] = Json::array();
   json["cells"] = Json::array();
   json["tables"] = Json::array();
   json["claims"] = Json::array();
   for (std::size_t run = 0; run < runs.size(); ++run) {
-    title += (title.empty() ? "" : " + ") + runs[run].name;
+    if (std::find(names.begin(), names.end(), runs[run].name) == names.end()) names.push_back(runs[run].name);
     const Summary summary = summarise(runs[run]);
     json["runs"].push_back(run_json(runs[run], summary, files[run]));
     shown.merge(credits(runs[run]));
@@ -291,13 +305,14 @@ ReportData report_data(std::vector<RunRecord> runs, const std::vector<std::strin
   }
   const std::vector<Comparison> all = comparisons(runs, baseline);
   add_comparisons(all, places, json);
-  json["title"] = title;
+  json["title"] = fmt::format("{}", fmt::join(names, " + "));
   json["version"] = this_version();
   json["command"] = command;
   json["credits"] = shown;
   json["matrix"] = matrix_json(all, places);
   json["scaling"] = scaling_json(runs, places);
   json["images"] = images.json();
+  json["history"] = history_or_null(runs, files);
   for (std::size_t run = 0; run < runs.size(); ++run) {
     if (const auto remark = version_remark(runs[run])) data.warnings.push_back(files[run] + ": " + *remark);
     const auto missing = images.missing().find(files[run]);

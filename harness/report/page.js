@@ -2,6 +2,7 @@
 
 const sections = [
   { id: "summary", title: "Summary", says: "How many trackers keep their claims, and which one is fastest where.", present: () => true, build: buildSummary },
+  { id: "history", title: "History", says: "What changed from result to result, as far as chance cannot have changed it.", present: () => report.history !== null, build: buildHistory },
   { id: "outcomes", title: "Verdicts", says: "Which tracker keeps its claims on which medium; a field leads to its cells.", present: () => report.scenes.length > manyScenes && report.cells.some((cell) => cell.verdict), build: buildVerdictMatrix },
   { id: "tables", title: "Tables", says: "Do the figures that someone published come out again, and where they do not, what makes the difference?", present: () => report.tables.length > 0, build: buildTables },
   { id: "claims", title: "Claims", says: "Does what was published hold? A refuted claim is a result; what cannot be told needs more samples, or a scene that is not here.", present: () => report.claims.length > 0, build: buildClaims },

@@ -20,12 +20,12 @@ function numberSpan(value, format = formatNumber, dataset = {}) {
   return element("span", { className: "number", dataset: { ...dataset, value: String(value) } }, format(value));
 }
 
-/** A value with its interval below it. */
-function intervalText(interval, format = (x) => formatNumber(x, 3)) {
+/** A value, with a mark behind it and its interval below. */
+function intervalText(interval, format = (x) => formatNumber(x, 3), mark = "") {
   const text = formatInterval(interval, format);
   const at = text.indexOf(" [");
-  if (at < 0) return text;
-  return element("span", {}, text.slice(0, at), element("small", { className: "ends" }, text.slice(at + 1)));
+  if (at < 0) return text + mark;
+  return element("span", {}, text.slice(0, at) + mark, element("small", { className: "ends" }, text.slice(at + 1)));
 }
 
 /** Long labels break after their slashes. */

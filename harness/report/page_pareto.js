@@ -49,7 +49,7 @@ function paretoPlot(scene, width, theme) {
     traces: [frontTrace(cells, theme), ...cells.map((cell) => paretoTrace(cell, theme))].filter(({ mode, x }) => mode !== "lines" || x.length > 1),
     layout: {
       ...baseLayout(theme),
-      height: width < 620 ? 360 + 20 * cells.length : 400,
+      height: width < 620 ? 400 + 20 * (1 + cells.length) : 400,
       xaxis: logAxis(theme, "ns a sample", cells.map((cell) => cell.time.ns_per_sample.value)),
       yaxis: logAxis(theme, "variance of a sample", cells.map((cell) => cell.cost.variance.value)),
       legend: legendFor(width, cells.length),

@@ -9,7 +9,7 @@ function reachedText(cell, place) {
   const target = secondsTo(cell, place);
   if (!target || !cell.time?.ns_per_sample) return unknown;
   if (!target.reached) return "never";
-  return element("span", {}, target.amortised ? "~" : "", intervalText(target, formatSeconds), unprovenMark(target));
+  return element("span", {}, target.amortised ? "~" : "", intervalText(target, formatSeconds, unprovenMark(target)));
 }
 
 function breakEvenText(scene, place) {

@@ -55,7 +55,7 @@ function buildSummary(body) {
   const runs = report.runs.map((run) => run.file).join(", ");
   body.append(
     element("p", { className: "about" }, `${countOf(report.cells.length, "cell")} of ${runs}. ${versionsText()}`), ...remarkLines(), verdictTotals(), winners);
-  if (report.tables.length === 0 && report.scenes.length <= 12) winners.open = true;
+  if (report.tables.length === 0 && report.history === null && report.scenes.length <= 12) winners.open = true;
   if (report.credits.length > 0) winners.after(details("Volumes shown and their makers", element("ul", {}, ...report.credits.map((line) => element("li", {}, line)))));
   return () => {
     const scenes = report.scenes.filter((scene) => winnersOf(scene).length > 0);

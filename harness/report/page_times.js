@@ -21,19 +21,34 @@ function timeTrace(cell, row, theme) {
   };
 }
 
+/** At most three ticks, which a narrow plot has room for. */
+function fewTicks(low, high) {
+  const decades = Array.from({ length: Math.ceil(Math.log10(high / low)) + 2 }, (_, k) => 10 ** (Math.floor(Math.log10(low)) + k));
+  const inside = (ticks) => ticks.map((x) => Number(x.toPrecision(12))).filter((x) => x >= low / 1.1 && x <= 1.1 * high);
+  const candidates = [inside(decades), inside(decades.flatMap((x) => [x, 2 * x, 5 * x])), high > low ? roundTicks(low, high) : [low]];
+  const ticks = candidates.find(({ length }) => length > 1) ?? [low];
+  return ticks.filter((_, k) => k % Math.ceil(ticks.length / 3) === 0);
+}
+
+function narrowTimeAxis(theme, ends) {
+  const ticks = fewTicks(Math.min(...ends), Math.max(...ends));
+  return axis(theme, "time of a ray", { type: "log", tickangle: 0, tickmode: "array", tickvals: ticks, ticktext: ticks.map(formatSeconds) });
+}
+
 function timesPlot(scene, width, theme) {
   const cells = cellsOf(scene).filter(reachesTheError).sort((a, b) => secondsTo(a, 0).value - secondsTo(b, 0).value);
   const rows = cells.map((_, row) => row);
   const ends = cells.flatMap((cell) => [secondsTo(cell, 0).low, secondsTo(cell, 0).value, secondsTo(cell, 0).high]).filter((x) => isNumber(x) && x > 0);
   const mark = (cell) => outcomeMarks[outcomeOf(cell)] ?? "";
-  const claim = (cell) => (claimTag(cell) === null ? "" : ` (${cell.claims})`);
-  const name = (cell) => plotText(`${shortenedInside(cell.label, width < 620 ? 32 : 60)}${claim(cell)}${unprovenMark(secondsTo(cell, 0))} ${mark(cell)}`);
+  const narrow = width < 620;
+  const claim = (cell) => (narrow || claimTag(cell) === null ? "" : ` (${cell.claims})`);
+  const name = (cell) => plotText(`${shortenedInside(cell.label, narrow ? 22 : 60)}${claim(cell)}${unprovenMark(secondsTo(cell, 0))} ${mark(cell)}`);
   return {
     traces: cells.map((cell, row) => timeTrace(cell, row, theme)),
     layout: {
       ...baseLayout(theme),
       height: 80 + 21 * cells.length,
-      xaxis: logAxis(theme, "seconds a ray until the error is 1\u00a0%", ends),
+      xaxis: narrow ? narrowTimeAxis(theme, ends) : logAxis(theme, "seconds a ray until the error is 1\u00a0%", ends),
       yaxis: { ...axis(theme, ""), tickmode: "array", tickvals: rows, ticktext: cells.map(name), range: [cells.length - 0.4, -0.6] },
     },
   };

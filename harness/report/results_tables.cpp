@@ -13,6 +13,7 @@
 #include "harness/model/cost.h"
 #include "harness/model/metrics.h"
 #include "harness/model/names.h"
+#include "harness/report/history_text.h"
 #include "harness/verdict/cell_word.h"
 
 namespace nullmark {
@@ -71,6 +72,7 @@ Line channel_line(const CellRecord& record, std::size_t c) {
   const auto once = [&](const std::optional<Real>& number) { return first ? short_number(number) : std::string(); };
   return {first ? tracker_label(record.cell) + (record.outputs.empty() ? "" : ", " + record.outputs[0])
                 : "  " + output_name(record, c),
+          first ? marked_word(record) : "",
           shown(channel, channel.rmse, channel.rmse_theory),
           short_number(channel.bias),
           shown(channel, unless_rounding(channel, channel.variance), unless_rounding(channel, channel.variance_theory)) +
@@ -82,7 +84,6 @@ Line channel_line(const CellRecord& record, std::size_t c) {
           once(metric(record, "ns_per_sample")),
           once(record.time ? std::optional(record.time->floor_ratio) : std::nullopt),
           short_number(variance_x_ns(record, c)),
-          first ? marked_word(record) : "",
           (first ? status_of(record) : std::string()) +
               (channel.reference || !channel.mean ? "" : fmt::format("{}mean {:.6g}", first ? ", " : "", *channel.mean))};
 }
@@ -158,12 +159,20 @@ std::vector<Line> side_by_side(const Table& table, const CellsByName& cells) {
 
 }  // namespace
 
-std::string results_tables(const RunRecord& run) {
-  std::string text;
+const std::vector<std::string>& results_columns() {
+  static const std::vector<std::string> kColumns = {"verdict",         "rmse",        "bias",           "variance",
+                                                    "variance theory", "lookups",     "lookups theory", "ns/sample alone",
+                                                    "ns/sample",       "floor ratio", "variance x ns",  "status"};
+  return kColumns;
+}
+
+std::string results_tables(const RunRecord& run, const TableShape& shape) {
+  std::string text = fmt::format("{} cells: {}\n\n", run.cells.size(), verdicts_counted(run));
+  std::vector<std::string> left_out;
   bool marked = false, uncertain = false;
   for (const auto& [title, records] : grouped(run.cells, heading)) {
-    std::vector<Line> lines = {{"estimator", "rmse", "bias", "variance", "variance theory", "lookups", "lookups theory",
-                                "ns/sample alone", "ns/sample", "floor ratio", "variance x ns", "verdict", "status"}};
+    std::vector<Line> lines = {{"estimator"}};
+    lines[0].insert(lines[0].end(), results_columns().begin(), results_columns().end());
     for (const CellRecord* record : records) {
       append_lines(*record, lines);
       for (const ChannelRecord& channel : record->channel) {
@@ -171,13 +180,14 @@ std::string results_tables(const RunRecord& run) {
         uncertain |= variance_is_uncertain(*record, channel);
       }
     }
-    text += title + "\n" + aligned(lines, 1) + "\n";
+    text += title + "\n" + shaped(lines, 2, 1, shape, left_out) + "\n";
   }
   if (marked)
     text += fmt::format("* theory: the relative variance is above {}, too heavy a tail for the sample's own\n\n", kHeavyTail);
   if (uncertain) text += "? too few samples to know this variance: rare samples decide it\n\n";
-  for (const auto& [title, lines] : configured_tables(run)) text += fmt::format("{}\n{}\n", title, aligned(lines, 1));
-  return text;
+  for (const auto& [title, lines] : configured_tables(run))
+    text += fmt::format("{}\n{}\n", title, fitted(lines, 1, shape.width, left_out));
+  return text + left_out_line(left_out);
 }
 
 std::vector<std::pair<std::string, std::vector<Line>>> configured_tables(const RunRecord& run) {

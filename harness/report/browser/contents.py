@@ -124,7 +124,34 @@ class ContentsTest(PageTest):
         self.detail = f"{len(claims)} claims"
 
     @once
-    def test_29_the_matrix_counts_every_cell(self):
+    def test_29_a_history_says_what_changed(self):
+        history = self.js("return report.history")
+        self.assertEqual(bool(self.browser.find_elements(By.CSS_SELECTOR, "#history")), history is not None)
+        if history is None:
+            self.skipTest("the results are no series")
+        self.assertEqual(self.find("#history .meaning").text, history["says"])
+        last = history["steps"][-1]
+        rows = self.js("return [...document.querySelectorAll('#history .history:first-of-type')].map((one) => one.tBodies[0].rows.length)")
+        if last["changes"]:
+            self.assertEqual(rows[0], len(last["changes"]))
+        self.js("document.querySelector('#history details.numbers').open = true")
+        self.wait(lambda: self.find("#history details.numbers table"))
+        drawn = self.js("""return [...document.querySelectorAll('#history details.numbers tbody tr')].map((row) =>
+            [...row.querySelectorAll('.spark')].map((one) => one.querySelectorAll('circle').length))""")
+        self.assertEqual(len(drawn), len(history["cells"]))
+        for cell, points in zip(history["cells"], drawn):
+            series = [cell[key] for key in ["lookups", "rmse", "variance", "ns_per_sample"]]
+            self.assertEqual(points, [count for count in (sum(x is not None for x in one) for one in series) if count])
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": False})
+        narrow = self.js("return document.documentElement.scrollWidth")
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                                     {"width": self.size[0], "height": self.size[1], "deviceScaleFactor": 1, "mobile": False})
+        self.assertLessEqual(narrow, 390)
+        self.js("document.querySelector('#history details.numbers').open = false")
+        self.detail = f"{history['says']}; {sum(map(len, drawn))} series"
+
+    @once
+    def test_2a_the_matrix_counts_every_cell(self):
         wanted = self.js("return report.scenes.length > manyScenes && report.cells.some((cell) => cell.verdict)")
         rows = self.js("""return [...document.querySelectorAll("#outcomes tbody tr")].map((row) =>
             [row.children[0].textContent, row.children[1].textContent, row.querySelectorAll(".field").length])""")

@@ -129,3 +129,15 @@ class PlotsTest(PageTest):
                     self.assertTrue(plots, f"{section}: {value}")
                     self.draw(plots[0])
                 Select(select).select_by_value(before)
+
+    def test_37_nothing_of_the_plots_of_time_is_cut_or_covered(self):
+        if not timed():
+            self.skipTest("nothing was timed")
+        self.draw_all()
+        bad = self.js("""return [...document.querySelectorAll('#times .graph')].flatMap((plot) => {
+            const box = (one) => one.getBoundingClientRect(), whole = box(plot), title = box(plot.querySelector('.xtitle'));
+            const ticks = [...plot.querySelectorAll('.xtick text')], names = [...plot.querySelectorAll('.ytick text')];
+            return [...ticks.filter((one) => box(one).bottom > title.top + 2), ...names.filter((one) => box(one).left < whole.left - 1),
+                    ...(title.right > whole.right + 1 ? [plot.querySelector('.xtitle')] : [])].map((one) => one.textContent);
+        })""")
+        self.assertEqual(bad, [])
