@@ -107,8 +107,8 @@ void count_cell(CellRecord& record, Summary& summary) {
     case Kind::not_run:
       ++summary.not_run;
       break;
-    case Kind::unclaimed:
-      ++summary.unclaimed;
+    case Kind::untested:
+      ++summary.untested;
   }
 }
 

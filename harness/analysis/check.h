@@ -17,7 +17,7 @@ struct Summary {
   std::size_t pass = 0;
   std::size_t own_mean = 0;           ///< PASSes of the mean that a tracker predicts for itself
   std::size_t agree = 0, differ = 0;  ///< pairs of trackers
-  std::size_t fail = 0, expected_open = 0, unexpected_open = 0, violated = 0, errors = 0, not_run = 0, unclaimed = 0;
+  std::size_t fail = 0, expected_open = 0, unexpected_open = 0, violated = 0, errors = 0, not_run = 0, untested = 0;
   std::size_t configured = 0;              ///< cells of the configuration
   std::size_t selected = 0;                ///< cells that the run was to cover: selected by `--filter`, regardless of `--shard`
   std::size_t never_started = 0;           ///< interrupted, out of time, or absent from the file though selected

@@ -166,10 +166,11 @@ TEST(JunitOfCells, NoVerdictIsNoPass) {
   const std::string text =
       junit(run_of({passed(), unjudged("the configuration disables the verdict"), unjudged(""), nothing}), "r");
   EXPECT_NE(text.find(R"(tests="4" failures="0" errors="0" skipped="3")"), std::string::npos) << text;
-  EXPECT_NE(text.find("<skipped message=\"nothing claimed: the configuration disables the verdict\">"), std::string::npos)
+  EXPECT_NE(text.find("<skipped message=\"not tested (claims unbiased): the configuration disables the verdict\">"),
+            std::string::npos)
       << text;
-  EXPECT_NE(text.find("<skipped message=\"nothing claimed: no verdict\">"), std::string::npos) << text;
-  EXPECT_NE(text.find("<skipped message=\"nothing claimed: no mean was tested\">"), std::string::npos) << text;
+  EXPECT_NE(text.find("<skipped message=\"not tested (claims unbiased): no verdict\">"), std::string::npos) << text;
+  EXPECT_NE(text.find("<skipped message=\"not tested (claims unbiased): no mean was tested\">"), std::string::npos) << text;
 }
 
 class Selection : public ProgramTest {
@@ -283,7 +284,7 @@ TEST_F(Nothing, RaysThatMissTheMediumTestNothing) {
   }
   EXPECT_EQ(run("check r.json --junit j.xml"), 5) << read("out");
   EXPECT_NE(read("out").find("0 PASS, 0 FAIL"), std::string::npos) << read("out");
-  EXPECT_NE(read("out").find("2 claim nothing\nno cell was judged: no ray meets any extinction: nothing was tested (2)\n"),
+  EXPECT_NE(read("out").find("2 not tested\nno cell was judged: no ray meets any extinction: nothing was tested (2)\n"),
             std::string::npos)
       << read("out");
   EXPECT_NE(read("j.xml").find(R"(failures="0" errors="0" skipped="2")"), std::string::npos) << read("j.xml");
@@ -296,7 +297,8 @@ TEST_F(Nothing, ADisabledVerdictIsSkippedWithTheReason) {
   ASSERT_EQ(run("run d.json -o r.json"), 0) << read("err");
   EXPECT_EQ(run("check r.json --junit j.xml"), 5) << read("out");
   EXPECT_NE(read("j.xml").find(R"(tests="2" failures="0" errors="0" skipped="2")"), std::string::npos) << read("j.xml");
-  EXPECT_NE(read("j.xml").find("nothing claimed: the configuration disables the verdict"), std::string::npos) << read("j.xml");
+  EXPECT_NE(read("j.xml").find("not tested (claims unbiased): the configuration disables the verdict"), std::string::npos)
+      << read("j.xml");
 }
 
 /// Many cells that need no look become one line; cells that need one stay listed.

@@ -248,6 +248,19 @@ void decide(Comparison& comparison, const std::vector<RunRecord>& runs, const st
 
 }  // namespace
 
+std::vector<std::size_t> fastest(const Comparison& comparison, bool unbiased) {
+  std::vector<std::size_t> places;
+  std::optional<std::size_t> best = unbiased ? std::nullopt : std::optional<std::size_t>(1);
+  for (std::size_t i = 0; i < comparison.cells.size(); ++i) {
+    const RankedCell& ranked = comparison.cells[i];
+    if (!ranked.rank || (unbiased && !stands_unbiased(*ranked.record))) continue;
+    // Cells are in the order of their ranks.
+    if (!best) best = ranked.rank;
+    if (ranked.rank == best) places.push_back(i);
+  }
+  return places;
+}
+
 bool is_proven_to_reach(const RankedCell& ranked, Real error) {
   constexpr Real kSlack = 1e-9;  // epsilon was multiplied by the mean, and is divided by it again
   return ranked.possible_bias <= error * (1 + kSlack);

@@ -66,6 +66,9 @@ struct Comparison {
   std::vector<Unpaired> unpaired;  ///< other cells with different streams or unknown errors
 };
 
+/// Places of the cells that are fastest to the first target, alone or tied: of all, or of those that stand as unbiased.
+std::vector<std::size_t> fastest(const Comparison& comparison, bool unbiased);
+
 /// Whether the tracker is proven to have no bias above this relative error, which the times to it take for granted.
 bool is_proven_to_reach(const RankedCell& ranked, Real error);
 

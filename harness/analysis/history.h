@@ -52,6 +52,7 @@ struct HistoryResult {
 struct HistoryStep {
   std::size_t cells = 0, compared = 0;  ///< of either side; sampled on both
   std::size_t changed = 0;              ///< cells with a change
+  std::size_t other_samples = 0;        ///< sampled on both sides, with other numbers of samples a ray
   std::vector<CellChange> changes;      ///< proven
   std::vector<CellChange> undecided;    ///< may be chance
   std::vector<std::string> notes;       ///< what was not compared, and why

@@ -29,7 +29,7 @@ bool is_proven_beyond(const CellRecord& record) { return record.verdict && recor
 /// Whether only the tracker, and no chance, can turn one verdict into the other.
 bool verdict_change_is_proven(const CellRecord& before, const CellRecord& after, bool same_samples) {
   const Kind was = kind_of(before), is = kind_of(after);
-  if (same_samples || was == Kind::error || was == Kind::unclaimed || is == Kind::unclaimed) return true;
+  if (same_samples || was == Kind::error || was == Kind::untested || is == Kind::untested) return true;
   if (is_proof(is) || is == Kind::violated || is == Kind::error) return true;
   // A bias within epsilon may be proven, or passed, as the samples fall.
   return is_proof(was) && (is == Kind::pass || is == Kind::agree) && is_proven_beyond(before);
@@ -118,7 +118,9 @@ class StepComparer {
     if (was != Kind::not_run && is == Kind::not_run)
       return changed(after.cell.name, Change::went, marked_word(before), "not run", after.reason);
     pairs_.emplace_back(&before, &after);
-    if (is_sampled(before) && is_sampled(after)) ++step_.compared;
+    if (!is_sampled(before) || !is_sampled(after)) return;
+    ++step_.compared;
+    if (before.cell.samples_per_ray != after.cell.samples_per_ray) ++step_.other_samples;
   }
 
   /// Whether the same build drew the same samples, so that no difference is chance.

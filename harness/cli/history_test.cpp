@@ -35,6 +35,13 @@ class HistoryCli : public ProgramTest {
     write(to, std::regex_replace(read(to), std::regex("\"start\": ?\"[0-9-]+T"), fmt::format("\"start\":\"{}T", day)));
   }
 
+  /// " (commit 0123abc)" as the table of results has it.
+  std::string commit_shown() const {
+    std::smatch found;
+    const std::string line = first_line();
+    return std::regex_search(line, found, std::regex(R"( \(commit [^)]*\))")) ? found[0].str() : "";
+  }
+
   std::string first_line() const { return read("out").substr(0, read("out").find('\n')); }
 };
 
@@ -51,6 +58,21 @@ TEST_F(HistoryCli, SaysFirstWhatChanged) {
   const Json json = parse_json(read("out"), "out");
   EXPECT_EQ(json["steps"][0]["changed"], 2);
   EXPECT_EQ(json["cells"][0]["lookups"].size(), 2u);
+}
+
+TEST_F(HistoryCli, NamesTheSettingThatIsNoChangeOfTheProgram) {
+  const std::string judged = R"({{"nullmark":"config/2","name":"j","timing":{{"enabled":false}},"experiments":[
+      {{"name":"e","rays":"single","samples_per_ray":{0},"verdict":{{"max_samples_per_ray":{0}}},"matrix":{{"estimator":"delta","medium":"cosine"}}}}]}})";
+  for (const auto& [name, day, samples] : {std::tuple("many", "2026-11-20", 1000000), std::tuple("few", "2026-11-22", 64)}) {
+    write(std::string(name) + ".config", fmt::format(fmt::runtime(judged), samples));
+    measure(std::string(name) + ".config", std::string(name) + ".json", day, "");
+  }
+  ASSERT_EQ(run("history many.json few.json"), 0) << read("err");
+  EXPECT_EQ(first_line(), "nothing changed since 2026-11-20" + commit_shown() +
+                              " but samples_per_ray, in 1 of 1 cells; 1 verdict differs, which may be chance");
+  measure("few.config", "loose.json", "2026-11-26", "", NULLMARK_LOOSE_PROGRAM);
+  ASSERT_EQ(run("history many.json loose.json"), 0) << read("err");
+  EXPECT_NE(first_line().find("; other samples_per_ray in 1"), std::string::npos) << read("out");
 }
 
 TEST_F(HistoryCli, RefusesWhatIsNoSeriesInOneLine) {

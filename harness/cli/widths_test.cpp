@@ -72,10 +72,13 @@ TEST_F(Widths, FilesHaveAllColumnsUnlessSomeAreChosen) {
   EXPECT_EQ(read("out").find("bias"), std::string::npos) << read("out");
   ASSERT_EQ(run("compare 'c d r.json' --columns 'variance,verdict'"), 0);
   EXPECT_NE(read("out").find("variance  verdict\n"), std::string::npos) << read("out");
-  for (const char* command : {"run 'c d.json' -o 'new.json' --columns rmsd", "compare 'c d r.json' --columns rmsd"}) {
+  for (const char* command : {"run 'c d.json' -o 'new.json' --columns speed", "compare 'c d r.json' --columns speed"}) {
     EXPECT_EQ(run(command), 2);
-    EXPECT_NE(read("err").find("--columns: there is no \"rmsd\"; expected some of verdict,"), std::string::npos) << read("err");
+    EXPECT_NE(read("err").find("--columns: unknown column \"speed\"; expected some of verdict,"), std::string::npos)
+        << read("err");
   }
+  EXPECT_EQ(run("compare 'c d r.json' --columns estimator,varianse"), 2);
+  EXPECT_NE(read("err").find("unknown column \"varianse\"; did you mean \"variance\"?"), std::string::npos) << read("err");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "new.json"));
 }
 
@@ -83,7 +86,7 @@ TEST_F(Widths, TheFirstLineIsTheMeaning) {
   ASSERT_EQ(run("run 'c d.json' -o 'c d r.json'"), 0);
   EXPECT_EQ(first_line().find("56 cells: "), 0u) << read("out");
   ASSERT_EQ(run("compare 'c d r.json'"), 0);
-  EXPECT_EQ(first_line().find("fastest to 1 %, alone or tied, of 7 scenes: "), 0u) << read("out");
+  EXPECT_EQ(first_line().find("Fastest to 1 % error, alone or tied, of 7 scenes: "), 0u) << read("out");
   run("check 'c d r.json'");
   EXPECT_NE(first_line().find(" PASS"), std::string::npos) << read("out");
 }

@@ -99,8 +99,12 @@ std::string left_out_line(const std::vector<std::string>& left_out) {
 
 void expect_columns(const std::vector<std::string>& words, const std::vector<std::string>& headings) {
   for (const std::string& word : words)
-    if (std::find(headings.begin(), headings.end(), word) == headings.end())
-      throw InputError(fmt::format("--columns: there is no \"{}\"; expected some of {}", word, fmt::join(headings, ",")));
+    if (word != "estimator" && std::find(headings.begin(), headings.end(), word) == headings.end()) {
+      const std::string near = nearest(word, headings);
+      throw InputError(fmt::format("--columns: unknown column \"{}\"; {}", word,
+                                   near.empty() ? fmt::format("expected some of {}", fmt::join(headings, ","))
+                                                : fmt::format("did you mean \"{}\"?", near)));
+    }
 }
 
 std::string wrapped(const std::string& text, std::size_t width) {

@@ -26,7 +26,7 @@ std::string shaped(const std::vector<std::vector<std::string>>& lines, std::size
 /// "no room for columns: ..." and how to choose them; empty where all had room.
 std::string left_out_line(const std::vector<std::string>& left_out);
 
-/// Throws InputError with the list of the headings for a word that is none of them.
+/// Throws InputError for a word that is no heading, with the nearest one, else with all of them.  "estimator" is always shown.
 void expect_columns(const std::vector<std::string>& words, const std::vector<std::string>& headings);
 
 /// Text whose lines are broken at spaces where they are longer; 0: as it is.

@@ -4,6 +4,7 @@
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 program=$1 folder=$2
+export NULLMARK_PROGRAM=$program
 mkdir -p "$folder"
 code=0
 for name in browser_test untimed many_cells; do

@@ -29,12 +29,11 @@ std::string marks_among(const RunRecord& run, Kind kind) {
 
 std::string counts(const RunRecord& run, const Summary& s) {
   return fmt::format(
-             "{} PASS{}, {} FAIL{}, {} INCONCLUSIVE as planned{}, {} INCONCLUSIVE{}, {} VIOLATED, {} errors, {} not run, {} "
-             "claim "
-             "nothing",
+             "{} PASS{}, {} FAIL{}, {} INCONCLUSIVE as planned{}, {} INCONCLUSIVE{}, {} VIOLATED, {} errors, {} not run, {} not "
+             "tested",
              s.pass, marks_among(run, Kind::pass), s.fail, marks_among(run, Kind::fail), s.expected_open,
              marks_among(run, Kind::expected_open), s.unexpected_open, marks_among(run, Kind::unexpected_open), s.violated,
-             s.errors, s.not_run, s.unclaimed) +
+             s.errors, s.not_run, s.untested) +
          (s.agree + s.differ > 0 ? fmt::format(", {} AGREE, {} DIFFER", s.agree, s.differ) : "");
 }
 
@@ -51,10 +50,10 @@ bool disables_verdict(const Json& cell) {
 }
 
 /// ": 3 because no ray meets any extinction: nothing was tested"; empty where no cell says why.
-std::string reasons_of_unclaimed(const RunRecord& run) {
+std::string reasons_of_untested(const RunRecord& run) {
   std::map<std::string, std::size_t> reasons;
   for (const CellRecord& record : run.cells)
-    if (kind_of(record) == Kind::unclaimed && !record.reason.empty()) ++reasons[record.reason];
+    if (kind_of(record) == Kind::untested && !record.reason.empty()) ++reasons[record.reason];
   std::string text;
   for (const auto& [reason, count] : reasons) text += fmt::format("{} {} ({})", text.empty() ? ":" : ";", reason, count);
   return text;
@@ -95,7 +94,7 @@ std::string families(const RunRecord& run) {
                          record.verdict->family,
                          lookups ? fmt::format(" (and the same among {} of lookups)", record.verdict->lookups_family) : "");
   const std::size_t off = configured_cells(run, disables_verdict), cells = run.cells.size();
-  if (off == 0) return "no cell was judged" + reasons_of_unclaimed(run);
+  if (off == 0) return "no cell was judged" + reasons_of_untested(run);
   return fmt::format("no cell was judged: the configuration disables the verdict in {} cells",
                      off == cells ? fmt::format("all {}", cells) : fmt::format("{} of {}", off, cells));
 }
@@ -103,7 +102,7 @@ std::string families(const RunRecord& run) {
 /// Whether a list of verdicts has the cell: all that are no plain PASS and claim something.
 bool is_listed(const CellRecord& record) {
   const Kind kind = kind_of(record);
-  return kind != Kind::unclaimed && ((kind != Kind::pass && kind != Kind::agree) || !marks_of(record).empty());
+  return kind != Kind::untested && ((kind != Kind::pass && kind != Kind::agree) || !marks_of(record).empty());
 }
 
 /// Whether somebody should look at a cell of the kind: always, and where every claim must be decided.

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "harness/analysis/comparison.h"
 #include "harness/io/text.h"
@@ -62,41 +61,40 @@ bool any_alone(const Comparison& comparison) {
                      [](const RankedCell& ranked) { return ranked.cost && ranked.cost->variance_x_ns_alone; });
 }
 
-std::vector<Line> ranking(const Comparison& comparison) {
-  const bool floors = any_floor(comparison), alone = any_alone(comparison);
-  // Costs come first: a narrow terminal leaves out what is on the right.
-  Line heading = {"",         "estimator",          "verdict",      "s to 1 %", "s to 0.1 %", "/ baseline",
-                  "variance", "variance x lookups", "variance x ns"};
-  if (alone) heading.emplace_back("alone");
-  if (floors) heading.insert(heading.end(), {"floor", "cheaper than the best unbiased until"});
-  std::vector<Line> lines = {heading};
-  for (const RankedCell& ranked : comparison.cells) {
-    const std::optional<Cost>& cost = ranked.cost;
-    Line line = {rank_shown(ranked),
-                 ranked.label,
-                 standing_of(*ranked.record),
-                 time_shown(ranked, 0),
-                 time_shown(ranked, 1),
-                 shown(ranked.relative),
-                 cost ? shown(cost->variance) : "-",
-                 cost ? shown(cost->variance_x_lookups) : "-",
-                 cost ? shown(cost->variance_x_ns) : "-"};
-    if (alone) line.push_back(cost ? shown(cost->variance_x_ns_alone) : "-");
-    if (floors) line.insert(line.end(), {floor_shown(ranked), break_even_shown(comparison, ranked)});
-    lines.push_back(std::move(line));
+constexpr const char *kAlone = "alone", *kFloor = "floor", *kBreakEven = "cheaper than the best unbiased until";
+
+/// The columns of a table whose headings are wanted.
+template <class Wanted>
+std::vector<Line> with_columns(const std::vector<Line>& whole, const Wanted& wanted) {
+  std::vector<Line> lines(whole.size());
+  for (std::size_t c = 0; c < whole[0].size(); ++c) {
+    if (!wanted(whole[0][c])) continue;
+    for (std::size_t i = 0; i < whole.size(); ++i) lines[i].push_back(whole[i][c]);
   }
   return lines;
+}
+
+std::vector<Line> ranking(const Comparison& comparison) {
+  std::vector<Line> lines = {{"", "estimator"}};
+  lines[0].insert(lines[0].end(), comparison_columns().begin(), comparison_columns().end());
+  for (const RankedCell& ranked : comparison.cells) {
+    const std::optional<Cost>& cost = ranked.cost;
+    lines.push_back({rank_shown(ranked), ranked.label, marked_word(*ranked.record), time_shown(ranked, 0), time_shown(ranked, 1),
+                     shown(ranked.relative), cost ? shown(cost->variance) : "-", cost ? shown(cost->variance_x_lookups) : "-",
+                     cost ? shown(cost->variance_x_ns) : "-", cost ? shown(cost->variance_x_ns_alone) : "-", floor_shown(ranked),
+                     break_even_shown(comparison, ranked)});
+  }
+  const bool floors = any_floor(comparison), alone = any_alone(comparison);
+  return with_columns(lines, [&](const std::string& heading) {
+    return heading == kAlone ? alone : heading == kFloor || heading == kBreakEven ? floors : true;
+  });
 }
 
 /// The columns of a ranking that a page of paper has room for.
 std::vector<Line> for_a_page(const std::vector<Line>& whole) {
   const std::vector<std::string> kept = {"", "estimator", "verdict", "variance", "s to 1 %", "/ baseline", "floor"};
-  std::vector<Line> lines(whole.size());
-  for (std::size_t c = 0; c < whole[0].size(); ++c) {
-    if (std::find(kept.begin(), kept.end(), whole[0][c]) == kept.end()) continue;
-    for (std::size_t i = 0; i < whole.size(); ++i) lines[i].push_back(whole[i][c]);
-  }
-  return lines;
+  return with_columns(whole,
+                      [&](const std::string& heading) { return std::find(kept.begin(), kept.end(), heading) != kept.end(); });
 }
 
 /// The interval alone, of a number that stands beside it.
@@ -171,22 +169,32 @@ std::string seam_lines(const Comparison& comparison) {
   return text;
 }
 
-/// Who is fastest where: "fastest to 1 %, alone or tied, in 3 scenes: ratio in 2, delta in 1".
-std::string fastest_line(const std::vector<Comparison>& all) {
-  constexpr std::size_t kNamed = 4;
-  std::map<std::string, std::size_t> wins;
+/// In how many scenes each tracker is among the fastest, the most frequent first: "ratio in 2 scenes, delta in 1 scene".
+std::string fastest_counted(const std::vector<Comparison>& all, bool unbiased) {
+  constexpr std::size_t kNamed = 2;
+  std::vector<std::pair<std::string, std::size_t>> wins;
   for (const Comparison& comparison : all)
-    for (const RankedCell& ranked : comparison.cells)
-      if (ranked.rank == std::size_t{1}) ++wins[ranked.label];
-  const std::string scenes = fmt::format("{} scene{}", all.size(), all.size() == 1 ? "" : "s");
-  if (wins.empty()) return fmt::format("no tracker is ranked in {}: none was timed, or none reaches 1 %\n\n", scenes);
-  std::vector<std::pair<std::string, std::size_t>> order(wins.begin(), wins.end());
-  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+    for (const std::size_t i : fastest(comparison, unbiased)) {
+      const std::string& label = comparison.cells[i].label;
+      const auto at = std::find_if(wins.begin(), wins.end(), [&](const auto& win) { return win.first == label; });
+      at == wins.end() ? void(wins.emplace_back(label, 1)) : void(++at->second);
+    }
+  std::stable_sort(wins.begin(), wins.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
   std::vector<std::string> named;
-  for (std::size_t i = 0; i < std::min(kNamed, order.size()); ++i)
-    named.push_back(fmt::format("{} in {}", order[i].first, order[i].second));
-  return fmt::format("fastest to 1 %, alone or tied, of {}: {}{}\n\n", scenes, fmt::join(named, ", "),
-                     order.size() > kNamed ? fmt::format(" and {} more", order.size() - kNamed) : "");
+  for (std::size_t i = 0; i < std::min(kNamed, wins.size()); ++i)
+    named.push_back(fmt::format("{} in {} scene{}", wins[i].first, wins[i].second, wins[i].second == 1 ? "" : "s"));
+  return fmt::format("{}{}", fmt::join(named, ", "),
+                     wins.size() > kNamed ? fmt::format(" and {} more", wins.size() - kNamed) : "");
+}
+
+/// Who is fastest where, in the words of the report's summary.
+std::string fastest_line(const std::vector<Comparison>& all) {
+  const auto ranked = static_cast<std::size_t>(
+      std::count_if(all.begin(), all.end(), [](const Comparison& one) { return !fastest(one, false).empty(); }));
+  if (ranked == 0) return "no tracker is ranked: none was timed, or none reaches 1 %\n\n";
+  const std::string unbiased = fastest_counted(all, true);
+  return fmt::format("Fastest to 1 % error, alone or tied, of {} scene{}: {}{}\n\n", ranked, ranked == 1 ? "" : "s",
+                     fastest_counted(all, false), unbiased.empty() ? "" : "; of those that claim to be unbiased: " + unbiased);
 }
 
 std::string baseline_line(const Comparison& comparison) {
@@ -196,11 +204,10 @@ std::string baseline_line(const Comparison& comparison) {
 }  // namespace
 
 const std::vector<std::string>& comparison_columns() {
-  static const std::vector<std::string> kColumns = {"verdict",       "s to 1 %",
-                                                    "s to 0.1 %",    "/ baseline",
-                                                    "variance",      "variance x lookups",
-                                                    "variance x ns", "alone",
-                                                    "floor",         "cheaper than the best unbiased until"};
+  // Costs come first: a narrow terminal leaves out what is on the right.
+  static const std::vector<std::string> kColumns = {
+      "verdict",       "s to 1 %", "s to 0.1 %", "/ baseline", "variance", "variance x lookups",
+      "variance x ns", kAlone,     kFloor,       kBreakEven};
   return kColumns;
 }
 

@@ -235,7 +235,7 @@ Json run_json(const RunRecord& run, const Summary& summary, const std::string& f
             {"violated", summary.violated},
             {"errors", summary.errors},
             {"not_run", summary.not_run},
-            {"unclaimed", summary.unclaimed}}}};
+            {"untested", summary.untested}}}};
 }
 
 /// Scenes, what their cells cost, and the pairs of cells on the same random streams.

@@ -112,9 +112,9 @@ std::string undecided_text(const std::vector<CellChange>& undecided, std::size_t
   for (const CellChange& one : undecided) cells.insert(one.cell);
   std::vector<CellChange> few(undecided.begin(),
                               undecided.begin() + static_cast<std::ptrdiff_t>(std::min(kFew, undecided.size())));
-  std::string text =
-      fmt::format("\nmay be chance, in {} cell{}{}\n", cells.size(), cells.size() == 1 ? "" : "s",
-                  few.size() < undecided.size() ? fmt::format(", {} of {} shown", few.size(), undecided.size()) : "");
+  std::string text = fmt::format(
+      "\nmay be chance, in {} cell{}{}\n", cells.size(), cells.size() == 1 ? "" : "s",
+      few.size() < undecided.size() ? fmt::format(", {} of {} shown; --json shows all", few.size(), undecided.size()) : "");
   return text + fitted(changes_table(few), 2, width, left_out);
 }
 
@@ -131,10 +131,21 @@ std::string verdicts_counted(const RunRecord& run) {
 std::string changes_line(const History& history) {
   const HistoryStep& step = history.steps.back();
   const std::string since = of_commit(history.results[history.results.size() - 2]);
+  if (step.changed == 0 && step.compared == 0) return fmt::format("nothing could be compared since {}", since);
+  std::string text;
   if (step.changed > 0)
-    return fmt::format("{} of {} cells changed since {}: {}", step.changed, step.cells, since, changes_counted(step));
-  if (step.compared == 0) return fmt::format("nothing could be compared since {}", since);
-  return fmt::format("nothing changed since {}: {} of {} cells compared", since, step.compared, step.cells);
+    text = fmt::format("{} of {} cells changed since {}: {}", step.changed, step.cells, since, changes_counted(step));
+  else if (step.other_samples == 0)
+    text = fmt::format("nothing changed since {}: {} of {} cells compared", since, step.compared, step.cells);
+  if (step.other_samples > 0)
+    text += text.empty() ? fmt::format("nothing changed since {} but samples_per_ray, in {} of {} cells", since,
+                                       step.other_samples, step.cells)
+                         : fmt::format("; other samples_per_ray in {}", step.other_samples);
+  const auto verdicts = std::count_if(step.undecided.begin(), step.undecided.end(),
+                                      [](const CellChange& one) { return one.change == Change::verdict; });
+  return verdicts == 0
+             ? text
+             : text + fmt::format("; {} verdict{}, which may be chance", verdicts, verdicts == 1 ? " differs" : "s differ");
 }
 
 std::string history_text(const History& history, std::size_t width) {

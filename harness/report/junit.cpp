@@ -36,7 +36,7 @@ Ending ending(const CellRecord& record) {
     case Kind::expected_open:
     case Kind::unexpected_open:
     case Kind::violated:
-    case Kind::unclaimed:
+    case Kind::untested:
       break;
   }
   return {"skipped", says()};

@@ -32,7 +32,7 @@ const firstOf = (key) => (cell) => cell[key][0] ?? null;
 
 /** Columns of the table of every cell: how they are shown, and by what they are sorted. */
 const cellColumns = [
-  { title: "verdict", show: (cell) => element("td", {}, outcomeBadge(cell.marked_word, outcomeOf(cell), { title: verdictReason(cell) })), sort: outcomeOf },
+  { title: "verdict", show: (cell) => element("td", {}, cellBadge(cell, { title: verdictReason(cell) })), sort: outcomeOf },
   { title: "estimator", show: (cell) => element("td", {}, markedLabel(cell.label)), sort: (cell) => cell.label },
   { title: "medium", show: textOf((cell) => shortMedium(cell.medium), (cell) => cell.medium), sort: (cell) => cell.medium },
   { title: "majorant", show: textOf((cell) => cell.majorant), sort: (cell) => cell.majorant },

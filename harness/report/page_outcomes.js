@@ -2,9 +2,20 @@
 
 const outcomeMarks = { PASS: "✓", FAIL: "✗", AGREE: "✓", DIFFER: "✗", VIOLATED: "!", INCONCLUSIVE: "?", "INCONCLUSIVE (as planned)": "?" };
 
-function outcomeBadge(text, word = text, more = {}) {
+const ownMeanMark = "(✓)";
+
+/** The mark of a cell.  A PASS against the tracker's own mean rules out no bias. */
+function markOf(cell) {
+  return outcomeOf(cell) === "PASS" && cell.marks.includes("own mean") ? ownMeanMark : outcomeMarks[outcomeOf(cell)] ?? "";
+}
+
+function outcomeBadge(text, word = text, more = {}, mark = outcomeMarks[word]) {
   const kind = word.split(" ")[0].toLowerCase();
-  return element(more.href ? "a" : "span", { className: `badge ${kind}`, ...more }, `${outcomeMarks[word] ?? "·"} ${text}`);
+  return element(more.href ? "a" : "span", { className: `badge ${kind}`, ...more }, `${mark || "·"} ${text}`);
+}
+
+function cellBadge(cell, more = {}) {
+  return outcomeBadge(cell.marked_word, outcomeOf(cell), more, markOf(cell));
 }
 
 const outcomeMeanings = {
@@ -14,7 +25,7 @@ const outcomeMeanings = {
   DIFFER: "the means of two trackers differ: one of them is biased",
   INCONCLUSIVE: "neither bias nor its absence is proven, though the plan foresaw a decision",
   "INCONCLUSIVE (as planned)": "the plan said beforehand that no affordable number of samples decides",
-  "nothing claimed": "the estimator claims nothing here, nothing was tested, or the configuration disables the verdict",
+  "not tested": "the estimator claims nothing, nothing here can test its claim, or the configuration disables the verdict",
 };
 
 function violationsText() {
@@ -28,7 +39,14 @@ function outcomeMeaning(word) {
   return word === "VIOLATED" ? violationsText() : outcomeMeanings[word] ?? "see the reasons in the table of every cell";
 }
 
-const verdictWords = ["PASS", "FAIL", "AGREE", "DIFFER", "VIOLATED", "INCONCLUSIVE", "INCONCLUSIVE (as planned)", "ERROR", "not run", "nothing claimed"];
+/** What the marks of some cells mean, with their words. */
+function marksMeaning(cells) {
+  return [...new Set(cells.map((cell) => markOf(cell) === ownMeanMark
+    ? `${ownMeanMark} PASS (own mean): the mean is the one that the tracker's theory predicts, which may be biased`
+    : `${markOf(cell)} ${outcomeOf(cell)}: ${outcomeMeaning(outcomeOf(cell))}`.trim()))].join("; ");
+}
+
+const verdictWords = ["PASS", "FAIL", "AGREE", "DIFFER", "VIOLATED", "INCONCLUSIVE", "INCONCLUSIVE (as planned)", "ERROR", "not run", "not tested"];
 
 /** How many cells of a word have each mark: "(3 by pilot, 1 own mean)". */
 function marksText(cells) {
@@ -44,6 +62,6 @@ function cellsByWord(cells) {
 
 function verdictTotals() {
   const badges = cellsByWord(report.cells).flatMap(([word, of]) =>
-    [outcomeBadge(`${of.length} ${word}`, word, { href: "#verdicts", title: outcomeMeaning(word), onclick: () => chooseOutcome(word) }), marksText(of)]);
+    [outcomeBadge(`${of.length} ${word}`, word, { href: "#verdicts", title: marksMeaning(of), onclick: () => chooseOutcome(word) }), marksText(of)]);
   return element("p", { className: "totals" }, ...badges);
 }

@@ -28,7 +28,7 @@ function estimatorCell(scene, entry, cell) {
 const rankingColumns = [
   { title: "rank", timed: true, of: (_, entry) => rankText(entry) },
   { title: "estimator", of: estimatorCell },
-  { title: "verdict", of: (_, __, cell) => outcomeBadge(cell.marked_word, outcomeOf(cell), { title: verdictReason(cell) }) },
+  { title: "verdict", of: (_, __, cell) => cellBadge(cell, { title: verdictReason(cell) }) },
   { title: "cost relative to baseline", timed: true, of: (_, entry) => intervalText(entry.relative) },
   { title: "seconds to\u00a01\u00a0%", timed: true, of: (_, __, cell) => reachedText(cell, 0) },
   { title: "seconds to\u00a00.1\u00a0%", timed: true, of: (_, __, cell) => reachedText(cell, 1) },

@@ -39,10 +39,9 @@ function timesPlot(scene, width, theme) {
   const cells = cellsOf(scene).filter(reachesTheError).sort((a, b) => secondsTo(a, 0).value - secondsTo(b, 0).value);
   const rows = cells.map((_, row) => row);
   const ends = cells.flatMap((cell) => [secondsTo(cell, 0).low, secondsTo(cell, 0).value, secondsTo(cell, 0).high]).filter((x) => isNumber(x) && x > 0);
-  const mark = (cell) => outcomeMarks[outcomeOf(cell)] ?? "";
   const narrow = width < 620;
   const claim = (cell) => (narrow || claimTag(cell) === null ? "" : ` (${cell.claims})`);
-  const name = (cell) => plotText(`${shortenedInside(cell.label, narrow ? 22 : 60)}${claim(cell)}${unprovenMark(secondsTo(cell, 0))} ${mark(cell)}`);
+  const name = (cell) => plotText(`${shortenedInside(cell.label, narrow ? 22 : 60)}${claim(cell)}${unprovenMark(secondsTo(cell, 0))} ${markOf(cell)}`);
   return {
     traces: cells.map((cell, row) => timeTrace(cell, row, theme)),
     layout: {
@@ -56,16 +55,15 @@ function timesPlot(scene, width, theme) {
 
 function timesCaption(scene) {
   const never = cellsOf(scene).filter((cell) => secondsTo(cell, 0)?.reached === false && hasCostAndTime(cell));
-  const words = [...new Set(cellsOf(scene).filter(reachesTheError).map(outcomeOf))];
   return [
-    `${words.map((word) => `${outcomeMarks[word] ?? ""} ${word}: ${outcomeMeaning(word)}`.trim()).join("; ")}.`,
+    `${marksMeaning(cellsOf(scene).filter(reachesTheError))}.`,
     never.length > 0 ? `Never, because of a bias that no number of samples removes: ${listed(never.map(labelWithFloor))}.` : "",
     unprovenHint(cellsOf(scene).map((cell) => secondsTo(cell, 0))),
   ].filter(Boolean).join(" ");
 }
 
 function timesNumbers(scene) {
-  const rows = cellsOf(scene).filter(hasCostAndTime).map((cell) => [markedLabel(cell.label), reachedText(cell, 0), outcomeBadge(cell.marked_word, outcomeOf(cell))]);
+  const rows = cellsOf(scene).filter(hasCostAndTime).map((cell) => [markedLabel(cell.label), reachedText(cell, 0), cellBadge(cell)]);
   return plainTable(["estimator", "seconds a ray to 1\u00a0%", "verdict"], rows);
 }
 

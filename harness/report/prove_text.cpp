@@ -35,7 +35,7 @@ struct Part {
     errors += kind == Kind::error;
     open += kind == Kind::expected_open || kind == Kind::unexpected_open;
     violated += kind == Kind::violated;
-    other += kind == Kind::unclaimed || kind == Kind::not_run;
+    other += kind == Kind::untested || kind == Kind::not_run;
     if (const auto bias = excluded(record)) {
       least = std::min(least, *bias);
       most = std::max(most, *bias);

@@ -51,15 +51,10 @@ std::string shown(const ChannelRecord& channel, const std::optional<Real>& value
   return heavy_tailed(channel) && theory ? short_number(theory) + "*" : short_number(value);
 }
 
-/// The status, and what stands beside the verdict's word: what a PASS proves, the reason of a FAIL.
+/// The status, and what stands beside the verdict's word: what a PASS proves, or the reason of any other word.
 std::string status_of(const CellRecord& record) {
-  std::string text = to_string(record.status);
-  if (!record.reason.empty()) text += ": " + record.reason;
-  const Kind kind = kind_of(record);
-  if (const std::string finding = finding_of(record);
-      (kind == Kind::pass || kind == Kind::fail || kind == Kind::agree || kind == Kind::differ) && !finding.empty())
-    text += ", " + finding;
-  return text;
+  const std::string status = to_string(record.status), finding = finding_of(record);
+  return finding.empty() || finding == status ? status : status + (record.status == Status::ok ? ", " : ": ") + finding;
 }
 
 std::string output_name(const CellRecord& record, std::size_t c) {

@@ -51,7 +51,7 @@ std::string failures_beside_the_mean(const VerdictRecord& verdict) {
 }
 
 /// Why a sampled cell has no verdict; results of older versions say it of no cell.
-std::string why_unclaimed(const CellRecord& record) {
+std::string why_untested(const CellRecord& record) {
   if (!record.reason.empty()) return record.reason;
   if (record.verdict) return "no mean was tested";
   return record.claims == "biased" ? "the estimator claims nothing" : "no verdict";
@@ -64,7 +64,7 @@ Outcome mean_of(const VerdictRecord& verdict) { return verdict.against == "own m
 Kind kind_of(const CellRecord& record) {
   if (record.status == Status::error) return Kind::error;
   if (record.status != Status::ok) return Kind::not_run;
-  if (!record.verdict) return Kind::unclaimed;
+  if (!record.verdict) return Kind::untested;
   const VerdictRecord& verdict = *record.verdict;
   const Outcome mean = mean_of(verdict);
   const bool pair = record.cell.minus.has_value();
@@ -72,7 +72,7 @@ Kind kind_of(const CellRecord& record) {
   if (mean == Outcome::fail || verdict.lookups == Outcome::fail || verdict.lawful == Outcome::fail) return Kind::fail;
   if (mean == Outcome::violated) return Kind::violated;
   if (mean == Outcome::inconclusive) return verdict.planned_undecidable ? Kind::expected_open : Kind::unexpected_open;
-  if (mean != Outcome::pass) return Kind::unclaimed;
+  if (mean != Outcome::pass) return Kind::untested;
   return pair ? Kind::agree : Kind::pass;
 }
 
@@ -152,10 +152,10 @@ const char* verdict_word(Kind kind) {
       return "ERROR";
     case Kind::not_run:
       return "not run";
-    case Kind::unclaimed:
+    case Kind::untested:
       break;
   }
-  return "nothing claimed";
+  return "not tested";
 }
 
 std::string with_marks(const std::string& word, const std::vector<std::string>& marks) {
@@ -165,22 +165,22 @@ std::string with_marks(const std::string& word, const std::vector<std::string>& 
   return fmt::format("{} ({})", word, fmt::join(marks, ", "));
 }
 
-std::string marked_word(const CellRecord& record) { return with_marks(verdict_word(kind_of(record)), mark_texts(record)); }
-
-std::string standing_of(const CellRecord& record) {
-  if (kind_of(record) != Kind::unclaimed) return marked_word(record);
-  return record.claims == "biased" ? "claims nothing" : fmt::format("not tested (claims {})", record.claims);
+std::string marked_word(const CellRecord& record) {
+  const Kind kind = kind_of(record);
+  if (kind != Kind::untested) return with_marks(verdict_word(kind), mark_texts(record));
+  return fmt::format("{} (claims {})", verdict_word(kind),
+                     record.claims.empty() || record.claims == "biased" ? "nothing" : record.claims);
 }
 
 std::string reason_of(const CellRecord& record) {
   if (record.status != Status::ok) return record.reason.empty() ? to_string(record.status) : record.reason;
-  if (!record.verdict) return why_unclaimed(record);
+  if (!record.verdict) return why_untested(record);
   const VerdictRecord& verdict = *record.verdict;
   std::string mean = verdict.reason;
   if (verdict.violated) mean = joined(mean, violations_of(record), ": ");
   const std::string beside = failures_beside_the_mean(verdict);
   const std::string text = mean_of(verdict) == Outcome::fail ? joined(mean, beside, "; ") : joined(beside, mean, "; ");
-  return text.empty() && kind_of(record) == Kind::unclaimed ? why_unclaimed(record) : text;
+  return text.empty() && kind_of(record) == Kind::untested ? why_untested(record) : text;
 }
 
 std::string finding_of(const CellRecord& record) {

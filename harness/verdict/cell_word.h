@@ -9,7 +9,7 @@ namespace nullmark {
 
 /// The kind of a cell in the totals of `check`.  `agree` and `differ` are what `pass` and `fail` are called of the difference of
 /// two trackers: two that are biased alike agree.
-enum class Kind { pass, fail, agree, differ, expected_open, unexpected_open, violated, error, not_run, unclaimed };
+enum class Kind { pass, fail, agree, differ, expected_open, unexpected_open, violated, error, not_run, untested };
 Kind kind_of(const CellRecord& record);
 
 /// The outcome of the mean, judged against the reference or the own mean.
@@ -44,11 +44,9 @@ const char* verdict_word(Kind kind);
 /// "PASS (by pilot, own mean)".
 std::string with_marks(const std::string& word, const std::vector<std::string>& marks);
 
-/// The word for a cell with its marks, the same in every output: "PASS (by pilot, own mean)".
+/// The word for a cell with its marks, the same in every output: "PASS (by pilot, own mean)".  Without a verdict it says what the
+/// tracker claims: "not tested (claims unbiased)".
 std::string marked_word(const CellRecord& record);
-
-/// The same beside a rank, where nothing decided says what the tracker claims: "not tested (claims unbiased)".
-std::string standing_of(const CellRecord& record);
 
 /// Why a cell is not PASS: from its status, verdict, lookups above the bound, and laws.  What fails comes first.
 std::string reason_of(const CellRecord& record);

@@ -26,7 +26,10 @@ TEST(Words, NoMarkChangesNoWord) {
   EXPECT_EQ(marked_word(open()), "INCONCLUSIVE");
   EXPECT_EQ(marked_word(open_as_planned()), "INCONCLUSIVE (as planned)");
   EXPECT_EQ(marked_word(violated()), "VIOLATED");
-  EXPECT_EQ(marked_word(unjudged("no reference")), "nothing claimed");
+  EXPECT_EQ(marked_word(unjudged("no reference")), "not tested (claims unbiased)");
+  CellRecord modest = unjudged("");
+  modest.claims = "biased";
+  EXPECT_EQ(marked_word(modest), "not tested (claims nothing)");
   EXPECT_EQ(marked_word(unsampled(passed(), Status::skipped, "no data")), "not run");
   EXPECT_EQ(marked_word(unsampled(passed(), Status::error, "not finite")), "ERROR");
 }
@@ -154,7 +157,7 @@ TEST(Words, AreTheSameInEveryOutput) {
   says(text, fails + ": cell 1: " + why + "\n");
   says(text,
        "2 PASS (1 bound not proven), 1 FAIL (1 by pilot), 0 INCONCLUSIVE as planned, 0 INCONCLUSIVE, 0 VIOLATED, 0 errors, "
-       "0 not run, 1 claim nothing\n");
+       "0 not run, 1 not tested\n");
   EXPECT_EQ(text.find("cell 3"), std::string::npos) << "a PASS without a mark needs no line";
   const std::string markdown = summary_markdown(run, summary, "r.json");
   says(markdown, "| " + passes + " | cell 0 | \\|bias\\| < 2 % of the mean |");
@@ -168,12 +171,14 @@ TEST(Words, AreTheSameInEveryOutput) {
   says(table, "ok, " + proves);
   says(table, fails);
   says(table, "ok, " + why);
-  says(stability_text(run), "1 PASS (bound not proven), 1 FAIL (by pilot), 1 nothing claimed, 1 PASS ");
+  says(results_tables(run_of({violated()})), "ok, " + finding_of(violated()));
+  says(results_tables(run_of({open()})), "ok, " + finding_of(open()));
+  says(stability_text(run), "1 PASS (bound not proven), 1 FAIL (by pilot), 1 not tested (claims unbiased), 1 PASS ");
   const std::string csv = export_results(run, "csv", "r.json");
   says(csv, ",verdict,marks,finding\r\n");
   says(csv, ",PASS,bound not proven,|bias| < 2 % of the mean\r\n");
   says(csv, ",FAIL,by pilot,\"" + why + "\"\r\n");
-  says(csv, ",nothing claimed,,no reference\r\n");
+  says(csv, ",not tested,,no reference\r\n");
   const std::string lines = export_results(run, "jsonl", "r.json");
   const Json first = Json::parse(lines.substr(0, lines.find('\n')));
   EXPECT_EQ(first["word"], "PASS");

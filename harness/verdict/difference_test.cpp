@@ -86,7 +86,7 @@ TEST(Difference, EqualBiasesPassUnseen) {
 
 TEST(Difference, TrackersThatClaimABiasAreNotCompared) {
   const RunRecord run = run_pairs(R"({"type":"ray_marching","steps":4})", R"("delta")");
-  EXPECT_EQ(kind_of(run.cells[0]), Kind::unclaimed);
+  EXPECT_EQ(kind_of(run.cells[0]), Kind::untested);
 }
 
 TEST(Difference, SurvivesTheFile) {

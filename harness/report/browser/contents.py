@@ -1,12 +1,14 @@
 """Numbers and words of the page are those of the results."""
 
+import os
 import re
+import subprocess
 
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
 from .page import PageTest
-from .results import CELLS, TABLES, VERSIONS, numbers_of, same, shown_number, timed
+from .results import CELLS, FILES, TABLES, VERSIONS, numbers_of, same, shown_number, timed
 from .views import once, once_a_layout
 
 
@@ -74,6 +76,14 @@ class ContentsTest(PageTest):
         lines = self.js("report.runs[0].remarks.push('a remark'); return remarkLines().map((line) => line.textContent)")
         self.js("report.runs[0].remarks.pop()")
         self.assertIn("a remark", lines[-2 if not timed() else -1])
+
+    @once
+    def test_28_the_fastest_are_those_of_compare(self):
+        said = self.js("return document.querySelector('#summary details > summary')?.textContent ?? ''").replace("\u00a0", " ")
+        lines = subprocess.run([os.environ["NULLMARK_PROGRAM"], "compare", *FILES], capture_output=True, text=True).stdout.splitlines()
+        if not timed():
+            self.skipTest("nothing was timed")
+        self.assertEqual(said, lines[0])
 
     @once
     def test_24_columns_of_time_are_there_where_something_was_timed(self):

@@ -89,6 +89,21 @@ class PlotsTest(PageTest):
             self.assertEqual(len(plot["seconds"]), len(plot["names"]))
 
     @once
+    def test_38_a_pass_of_an_own_mean_has_a_mark_of_its_own(self):
+        if not timed():
+            self.skipTest("nothing was timed")
+        self.draw_all()
+        names = self.js("return [...document.querySelectorAll('#times .graph')].flatMap((plot) => plot.layout.yaxis.ticktext)")
+        own = self.js("""return [...document.querySelectorAll('#times .graph')].flatMap((plot) => plot.data)
+            .filter(({ text }) => text[0].includes('own mean')).length""")
+        self.assertEqual(sum(name.endswith("(✓)") for name in names), own)
+        badges = self.js("return [...document.querySelectorAll('.badge.pass')].map((one) => one.textContent).filter((text) => text.includes('own mean'))")
+        self.assertTrue(all(badge.startswith("(✓) PASS") for badge in badges), badges)
+        captions = self.js("return [...document.querySelectorAll('#times figcaption')].map((one) => one.textContent).join()")
+        self.assertIn("which may be biased" if own else "PASS", captions)
+        self.detail = f"{own} own means in plots, {len(badges)} badges"
+
+    @once
     def test_34_only_what_is_right_is_exact(self):
         cells = self.js("return report")["cells"]
         still = [cell for cell in cells if cell["cost"] and cell["cost"]["variance"]["value"] == 0]

@@ -3,6 +3,7 @@
 import json
 import pathlib
 
+FILES = []
 CELLS = []  # of all results, in the order of the page
 TABLES = []  # (table, cells of its run by name)
 VERSIONS = []  # of the programs that measured
@@ -17,6 +18,7 @@ def as_list(value):
 
 
 def read_results(files):
+    FILES.extend(files)
     for file in files:
         run = json.loads(pathlib.Path(file).read_text())
         CELLS.extend(run["cells"])
