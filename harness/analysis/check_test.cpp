@@ -13,7 +13,7 @@ namespace nullmark {
 namespace {
 
 CellRecord of_tracker(CellRecord record, const std::string& tracker, const std::string& claims = "unbiased") {
-  record.cell.estimator.type = record.cell.estimator.label = tracker;
+  record.cell.estimator = Component{tracker, {}, tracker, ""};
   record.claims = claims;
   return record;
 }
@@ -33,7 +33,7 @@ std::vector<CellRecord> marches() {
   std::vector<CellRecord> cells;
   for (const int steps : {8, 16, 32}) {
     CellRecord record = of_tracker(passed_by_own_mean(), "ray_marching", "consistent");
-    record.cell.estimator.values = {{"steps", steps}};
+    record.cell.estimator.edit([&](Component& estimator) { estimator.values = {{"steps", steps}}; });
     record.order = 1;
     record.channel.at(0).reference = 0.5;
     record.channel[0].reference_error = 1e-12;

@@ -121,7 +121,7 @@ std::optional<std::size_t> best_unbiased(const std::vector<RankedCell>& cells) {
 }
 
 bool is_named(const RankedCell& ranked, const std::string& name) {
-  return ranked.record->cell.estimator.type == name || tracker_label(ranked.record->cell) == name || ranked.label == name;
+  return ranked.record->cell.estimator->type == name || tracker_label(ranked.record->cell) == name || ranked.label == name;
 }
 
 /// Why two cells are not of the same random streams, or their errors on them not known; empty where they are.
@@ -319,8 +319,8 @@ std::vector<Comparison> comparisons(const std::vector<RunRecord>& runs, const st
         ranked.amortised.push_back(ranked.cost && is_amortised(*ranked.cost, target));
       }
       ranked.possible_bias = possible_bias(ranked);
-      known.insert(known.end(), {ranked.label, record.cell.estimator.type});
-      types.insert(record.cell.estimator.type);
+      known.insert(known.end(), {ranked.label, record.cell.estimator->type});
+      types.insert(record.cell.estimator->type);
       all[place->second].cells.push_back(std::move(ranked));
     }
   for (Comparison& comparison : all) decide(comparison, runs, baseline);

@@ -238,7 +238,7 @@ TEST(Comparison, PairedIntervalsHoldTheTrueRatio) {
     const Interval ratio = comparison.pairings[0].ratio;
     const auto theory = [&](std::size_t i) {
       return *std::find_if(run.cells.begin(), run.cells.end(),
-                           [&](const CellRecord& record) { return record.cell.estimator.type == (i == 0 ? "ratio" : "delta"); })
+                           [&](const CellRecord& record) { return record.cell.estimator->type == (i == 0 ? "ratio" : "delta"); })
                   ->channel[0]
                   .variance_theory;
     };

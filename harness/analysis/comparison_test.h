@@ -11,7 +11,7 @@ namespace nullmark::comparison_test {
 /// A cell of one ray with 100 samples: reference .5, variance .04, 10 ns a sample.
 inline CellRecord cell(const std::string& estimator, Real variance = 0.04, Real ns = 10) {
   CellRecord record;
-  record.cell.estimator.type = record.cell.estimator.label = estimator;
+  record.cell.estimator = Component{estimator, {}, estimator, ""};
   record.cell.samples_per_ray = 100;
   record.claims = "unbiased";
   record.status = Status::ok;

@@ -26,8 +26,8 @@ struct ScenePairs {
 };
 
 std::string scene_of(const CellRecord& record) {
-  std::string scene =
-      fmt::format("{} on {}, {}, {}", record.cell.experiment, record.medium->label, record.majorant->label, record.ray_set->label);
+  std::string scene = fmt::format("{} on {}, {}, {}", record.cell.experiment, record.medium->label, record.majorant->label,
+                                  record.ray_set->label);
   if (const std::string transport = transport_label(record.cell.transport); !transport.empty()) scene += ", " + transport;
   return fmt::format("{}, seed {}", scene, record.cell.seed);
 }
@@ -38,7 +38,7 @@ std::vector<std::string> disagreements(const RunRecord& run) {
   std::map<std::string, ScenePairs> scenes;
   for (const CellRecord& record : run.cells) {
     if (!record.cell.minus) continue;
-    const std::string &first = record.cell.estimator.label, &second = record.cell.minus->label;
+    const std::string &first = record.cell.estimator->label, &second = (*record.cell.minus)->label;
     ScenePairs& pairs = scenes[scene_of(record)];
     if (kind_of(record) == Kind::agree) pairs.agree.emplace(first, second);
     if (kind_of(record) == Kind::differ) pairs.differ[first].insert(second);

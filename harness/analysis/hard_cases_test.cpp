@@ -315,7 +315,7 @@ TEST(HardCases, VolumesAtTheirLimits) {
 TEST(HardCases, ReferencesAgreeWithLongDouble) {
   const Plan plan = read_config(read_file(NULLMARK_SOURCE_DIR "/configs/hard_cases.json"), "hard_cases.json");
   const RunRecord run =
-      run_of(plan, [](const Cell& cell) { return cell.estimator.type == "closed_form" || cell.estimator.type == "regular"; });
+      run_of(plan, [](const Cell& cell) { return cell.estimator->type == "closed_form" || cell.estimator->type == "regular"; });
   const auto depth_of = [](const CellRecord& record) -> std::optional<long double> {
     const Component& field = record.medium->field;
     if (record.cell.experiment == "rays" || record.cell.experiment == "negative_zero") return std::nullopt;

@@ -92,7 +92,8 @@ TEST(History, NamesEachChange) {
   EXPECT_EQ(said([](CellRecord& record) { record.squared_error_blocks.assign(16, 0.3); }), "1 larger error");
   EXPECT_EQ(said([](CellRecord& record) { record.squared_error_blocks.assign(16, 0.2); }), "1 smaller error");
   EXPECT_EQ(said([](CellRecord& record) { record.cell.samples_per_ray = 17; }), "");
-  EXPECT_EQ(said([](CellRecord& record) { record.cell.estimator.type = "other"; }), "1 other setting");
+  EXPECT_EQ(said([](CellRecord& record) { record.cell.estimator.edit([](Component& estimator) { estimator.type = "other"; }); }),
+            "1 other setting");
   EXPECT_EQ(said([](CellRecord& record) { record.cell.name = "cell 7"; }), "1 new, 1 gone");
   EXPECT_EQ(said([](CellRecord& record) {
               record = unsampled(record, Status::error, "broke");

@@ -35,11 +35,11 @@ void add_numbers(const std::string& prefix, const Component& component, std::map
 /// All that a cell is but one of its parameters.
 std::string without(const CellRecord& record, const std::map<std::string, Real>& numbers, const std::string& axis) {
   std::string key =
-      fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}", record.cell.experiment, record.cell.estimator.type, record.medium->field.type,
+      fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}", record.cell.experiment, record.cell.estimator->type, record.medium->field.type,
                   record.majorant->type, record.ray_set->type, to_string(record.cell.quantity), to_string(record.cell.precision),
                   record.cell.seed, transport_label(record.cell.transport));
   // Text and lists stand in the labels alone; numbers do as well, but would tell the points of a series apart.
-  for (const auto* component : {&record.cell.estimator, &record.medium->field, &*record.majorant, &*record.ray_set})
+  for (const auto* component : {&*record.cell.estimator, &record.medium->field, &*record.majorant, &*record.ray_set})
     for (const auto& [name, value] : component->values)
       if (!number_of(value)) key += "|" + name + ":" + to_text(value);
   for (const MediumSpec& channel : record.medium->per_channel) key += "|" + channel.label;
@@ -62,7 +62,7 @@ std::optional<Interval> exponent(const ScalingSeries& series, std::size_t from,
 
 std::map<std::string, Real> numeric_parameters(const CellRecord& record) {
   std::map<std::string, Real> numbers{{"channels", record.channels}};
-  add_numbers("estimator.", record.cell.estimator, numbers);
+  add_numbers("estimator.", *record.cell.estimator, numbers);
   add_numbers("medium.", record.medium->field, numbers);
   add_numbers("majorant.", *record.majorant, numbers);
   add_numbers("rays.", *record.ray_set, numbers);
@@ -118,7 +118,7 @@ std::vector<ScalingSeries> scaling_series(const RunRecord& run) {
       series.cells.push_back(record);
     }
     const CellRecord& first = *series.cells.front();
-    series.tracker = series.axis.rfind("estimator.", 0) == 0 ? first.cell.estimator.type : tracker_label(first.cell);
+    series.tracker = series.axis.rfind("estimator.", 0) == 0 ? first.cell.estimator->type : tracker_label(first.cell);
     const auto label = [&](const char* prefix, const std::string& whole, const std::string& type) {
       return series.axis.rfind(prefix, 0) == 0 || (series.axis == "channels" && std::string(prefix) == "medium.") ? type : whole;
     };

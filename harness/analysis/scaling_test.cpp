@@ -52,7 +52,7 @@ TEST(Scaling, SeriesDifferInOneParameterAlone) {
     EXPECT_EQ(one.x, (std::vector<Real>{1, 2, 4}));
     EXPECT_NEAR(one.lookups->value, 1, 1e-12);
     EXPECT_FALSE(one.time);
-    for (const CellRecord* record : one.cells) EXPECT_EQ(record->cell.estimator.type, one.tracker);
+    for (const CellRecord* record : one.cells) EXPECT_EQ(record->cell.estimator->type, one.tracker);
   }
 }
 

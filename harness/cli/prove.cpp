@@ -105,7 +105,7 @@ ExitCode prove_command(const ProveCommand& command) {
   catch_signals();
   return run_battery(command, battery, [&](RunRecord run) {
     const Summary summary = summarise(run);
-    tell("estimator {}\n{}{}", estimator, members_text(battery.plan.cells[0].estimator.type), scenes_text(run));
+    tell("estimator {}\n{}{}", estimator, members_text(battery.plan.cells[0].estimator->type), scenes_text(run));
     for (const std::string& one : battery.left_out) tell("not tried: {}\n", one);
     tell("{}", findings_text(run));
     for (const std::string& one : summary.undecided_trackers) tell("{}\n", one);

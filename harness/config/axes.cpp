@@ -36,6 +36,12 @@ std::vector<Setter> setters(const Values& values, Set set) {
   return result;
 }
 
+/// All cells with a value hold it once.
+template <class Value>
+std::vector<Shared<Value>> shared_values(std::vector<Value> values) {
+  return {std::make_move_iterator(values.begin()), std::make_move_iterator(values.end())};
+}
+
 template <class Values, class Fits>
 Test any_fits(Values values, Fits fits) {
   return [values = std::move(values), fits](const ConfiguredCell& configured) {
@@ -56,16 +62,17 @@ Axis axis(const char* name, Json schema, Read read, Member member) {
 /// The same of a specification that may sweep parameters; a pattern gives some of them.
 template <class Read, class ReadPattern, class Member>
 Axis swept_axis(const char* name, Read read, ReadPattern read_pattern, Member member) {
-  return {
-      name,
-      [=](const JsonNode& node) { return setters(joined(node, read), [=](auto& c, const auto& value) { member(c) = value; }); },
-      [=](const JsonNode& node) {
-        return any_fits(read_pattern(node),
-                        [=](auto& c, const auto& pattern) { return member(c) && matches(pattern, *member(c)); });
-      },
-      [=](const ConfiguredCell& a, const ConfiguredCell& b) { return member(a) == member(b); },
-      definition(name),
-      true};
+  return {name,
+          [=](const JsonNode& node) {
+            return setters(shared_values(joined(node, read)), [=](auto& c, const auto& value) { member(c) = value; });
+          },
+          [=](const JsonNode& node) {
+            return any_fits(read_pattern(node),
+                            [=](auto& c, const auto& pattern) { return member(c) && matches(pattern, **member(c)); });
+          },
+          [=](const ConfiguredCell& a, const ConfiguredCell& b) { return member(a) == member(b); },
+          definition(name),
+          true};
 }
 
 template <class Member>

@@ -13,9 +13,8 @@ namespace nullmark {
 /// A cell during the expansion of its experiment: it holds specifications instead of indices.
 struct ConfiguredCell {
   std::string experiment;  ///< its name in the file
-  std::optional<Component> estimator, minus, rays;
-  std::optional<MediumSpec> medium;
-  std::optional<Component> majorant;
+  std::optional<Shared<Component>> estimator, minus, majorant, rays;
+  std::optional<Shared<MediumSpec>> medium;
   bool has_samples = false;
   Cell cell;
 };

@@ -61,7 +61,7 @@ void add_distinctions(const Plan& plan, const std::vector<Cell*>& cells) {
 void name_cells(Plan& plan) {
   for (Cell& cell : plan.cells) {
     cell.id = cell_id(plan, cell);
-    cell.name = fmt::format("{}{}/{}/{}", cell.estimator.label, cell.minus ? "/minus:" + cell.minus->label : "",
+    cell.name = fmt::format("{}{}/{}/{}", cell.estimator->label, cell.minus ? "/minus:" + (*cell.minus)->label : "",
                             plan.media[cell.medium]->label, plan.majorants[cell.majorant]->label);
     if (cell.precision != Precision::float64) cell.name += "/" + to_string(cell.precision);
     if (!cell.lanes) cell.name += "/one_walk";

@@ -9,8 +9,8 @@ namespace nullmark {
 
 /// The label of a tracker: "ratio", "ratio/float".
 inline std::string tracker_label(const Cell& cell) {
-  std::string label = cell.estimator.label;
-  if (cell.minus) label += "/minus:" + cell.minus->label;
+  std::string label = cell.estimator->label;
+  if (cell.minus) label += "/minus:" + (*cell.minus)->label;
   if (cell.precision != Precision::float64) label += "/" + to_string(cell.precision);
   if (!cell.lanes) label += "/one_walk";
   return label;

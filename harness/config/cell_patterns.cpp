@@ -36,7 +36,8 @@ std::vector<std::size_t> CellPatterns::matching(const JsonNode& node) const {
 
 std::string CellPatterns::described(std::size_t configured) const {
   const ConfiguredCell& found = cells_[configured];
-  return fmt::format("{}: {}/{}/{}", found.experiment, found.estimator->label, found.medium->label, found.majorant->label);
+  return fmt::format("{}: {}/{}/{}", found.experiment, (*found.estimator)->label, (*found.medium)->label,
+                     (*found.majorant)->label);
 }
 
 void CellPatterns::matches_none(const JsonNode& node, const char* expected) const {
@@ -116,7 +117,7 @@ std::vector<std::string> CellPatterns::counterparts(const JsonNode& of, const Js
       std::vector<std::size_t> alike = found;
       if (found.size() > 1 && node.has("estimator"))
         std::erase_if(alike, [&](std::size_t candidate) {
-          return !agree_beside(node["estimator"], *cells_[configured].estimator, *cells_[candidate].estimator);
+          return !agree_beside(node["estimator"], **cells_[configured].estimator, **cells_[candidate].estimator);
         });
       if (alike.size() == 1) found = alike;
       if (found.size() > 1)

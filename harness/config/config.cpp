@@ -34,7 +34,7 @@ class PlanBuilder {
     cell.estimator = *configured.estimator;
     cell.minus = configured.minus;
     cell.medium = media_.index_of(plan_.media, *configured.medium);
-    if (!configured.medium->optional && plan_.media[cell.medium]->optional)
+    if (!(*configured.medium)->optional && plan_.media[cell.medium]->optional)
       plan_.media[cell.medium].edit([](MediumSpec& medium) { medium.optional = false; });
     cell.majorant = majorants_.index_of(plan_.majorants, *configured.majorant);
     cell.rays = ray_sets_.index_of(plan_.ray_sets, *configured.rays);
@@ -46,12 +46,12 @@ class PlanBuilder {
   class Index {
    public:
     template <class Spec>
-    std::size_t index_of(std::vector<Shared<Spec>>& list, const Spec& spec) {
-      std::vector<std::size_t>& places = of_label_[spec.label];
+    std::size_t index_of(std::vector<Shared<Spec>>& list, const Shared<Spec>& spec) {
+      std::vector<std::size_t>& places = of_label_[spec->label];
       for (const std::size_t node : places)
-        if (*list[node] == spec) return node;
+        if (list[node] == spec) return node;
       places.push_back(list.size());
-      list.emplace_back(spec);
+      list.push_back(spec);
       return list.size() - 1;
     }
 
@@ -114,8 +114,9 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
   std::map<std::vector<std::string>, std::vector<std::size_t>> of_labels;
   for (const JsonNode& entry : top["experiments"].elements()) {
     for (ConfiguredCell& configured : read_experiment(entry, seed.value_or(own_seed))) {
-      std::vector<std::size_t>& alike = of_labels[{configured.cell.experiment, configured.estimator->label,
-                                                   configured.medium->label, configured.majorant->label, configured.rays->label}];
+      std::vector<std::size_t>& alike =
+          of_labels[{configured.cell.experiment, (*configured.estimator)->label, (*configured.medium)->label,
+                     (*configured.majorant)->label, (*configured.rays)->label}];
       const auto same = [&](std::size_t other) { return same_statistics(configured, plan.cells[other]); };
       if (std::any_of(alike.begin(), alike.end(), same)) continue;
       alike.push_back(plan.cells.size());
@@ -179,6 +180,9 @@ Plan read_configs(const std::vector<ConfigSource>& sources, std::optional<std::u
   plan.timing = files.front().timing;
   plan.error_rates = files.front().error_rates;
   plan.name = joint_name(files);
+  std::size_t cells = 0;
+  for (const DraftPlan& file : files) cells += file.cells.size();
+  plan.cells.reserve(cells);
   PlanBuilder builder(plan);
   for (const DraftPlan& file : files) {
     if (!agree(file.timing, plan.timing))

@@ -27,7 +27,7 @@ Plan shipped(const std::string& name) {
 
 const CellRecord& find(const std::vector<CellRecord>& records, const std::string& experiment, const std::string& estimator) {
   for (const CellRecord& record : records)
-    if (record.cell.experiment == experiment && record.cell.estimator.label == estimator) return record;
+    if (record.cell.experiment == experiment && record.cell.estimator->label == estimator) return record;
   throw std::runtime_error("no cell " + experiment + " " + estimator);
 }
 
@@ -127,7 +127,7 @@ TEST(Configs, Seed004TableIsReproducedAndCorrected) {
       EXPECT_LT(*record.channel[0].rmse, 1e-12) << record.cell.name;
     }
     // T = x^.999, rounded to 8 bits: a fifth above the printed .00079.
-    if (record.cell.estimator.type == "stratified_published_offset") {
+    if (record.cell.estimator->type == "stratified_published_offset") {
       EXPECT_NEAR(*record.channel[0].rmse, 0.00096, 0.0003) << record.cell.name;
     }
   }
@@ -165,13 +165,13 @@ TEST(Configs, Seed000TreesLeaveHomogeneousMediaAlone) {
   });
   std::map<std::string, const CellRecord*> global;
   for (const CellRecord& record : records)
-    if (record.majorant->type == "global") global[record.cell.estimator.label] = &record;
+    if (record.majorant->type == "global") global[record.cell.estimator->label] = &record;
   EXPECT_EQ(global.size(), 4u);
   int trees = 0;
   for (const CellRecord& record : records) {
     if (record.majorant->type != "kd_tree" && record.majorant->type != "octree") continue;
     ++trees;
-    const CellRecord& one = *global.at(record.cell.estimator.label);
+    const CellRecord& one = *global.at(record.cell.estimator->label);
     EXPECT_EQ(record.structure->cells, 1u) << record.cell.name;
     EXPECT_EQ(record.lookups, one.lookups) << record.cell.name;
     EXPECT_EQ(record.draws, one.draws) << record.cell.name;
@@ -197,7 +197,7 @@ TEST(Configs, Seed003SpectralRanksTheSchemes) {
       if (channel.variance_theory) {
         EXPECT_LT(std::abs(*channel.bias), 5.5 * std::sqrt(*channel.variance_theory / static_cast<Real>(record.samples)));
       }
-    if (record.cell.experiment == "constant") constant[record.cell.estimator.label] = &record;
+    if (record.cell.experiment == "constant") constant[record.cell.estimator->label] = &record;
   }
   const auto variance = [&](const std::string& label, std::size_t channel) {
     return *constant.at(label)->channel[channel].variance_theory;
@@ -257,7 +257,7 @@ TEST_F(RealVolumes, ReferencesAgreeWithAMillionStepMarch) {
 
 std::function<bool(const Cell&)> ratio_on_smoke(const Plan& plan) {
   return [&plan](const Cell& cell) {
-    return plan.media[cell.medium]->label.find("/smoke.vdb") != std::string::npos && cell.estimator.label == "ratio";
+    return plan.media[cell.medium]->label.find("/smoke.vdb") != std::string::npos && cell.estimator->label == "ratio";
   };
 }
 

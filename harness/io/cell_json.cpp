@@ -125,7 +125,9 @@ void visit_cell(Visit& visit, CellRecord& record) {
   visit.required("name", cell.name);
   visit.required("experiment", cell.experiment);
   visit.part("estimator", [&](auto& inner) {
-    visit_component(inner, cell.estimator, ComponentKind::estimator, cell.estimator.label);
+    Component estimator = *cell.estimator;
+    visit_component(inner, estimator, ComponentKind::estimator, estimator.label);
+    if constexpr (Visit::kReads) cell.estimator = std::move(estimator);
     inner.required("claims", record.claims);
     inner.required("range", record.range);
     inner.sparse("order", record.order, "of a consistent estimator's bias in its step");
@@ -179,7 +181,9 @@ void visit_cell(Visit& visit, CellRecord& record) {
 /// What was measured and found.
 template <class Visit>
 void visit_findings(Visit& visit, CellRecord& record) {
-  const auto statistic = [&](std::optional<Real> ChannelRecord::*member) { return ChannelsField<ChannelRecord>{record, record.channel, member}; };
+  const auto statistic = [&](std::optional<Real> ChannelRecord::*member) {
+    return ChannelsField<ChannelRecord>{record, record.channel, member};
+  };
   visit.required("status", record.status);
   visit.sparse("reason", record.reason);
   visit.sparse("build", record.build, "compiler, C library and instruction set of the cell, where not those of the provenance");

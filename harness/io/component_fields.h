@@ -58,11 +58,18 @@ struct ComponentField {
 };
 
 struct OptionalEstimatorField {
-  std::optional<Component>& component;
+  std::optional<Shared<Component>>& component;
 
   bool empty() const { return !component; }
-  Json json() const { return ComponentField{*component, ComponentKind::estimator}.json(); }
-  void read(const JsonNode& node) const { ComponentField{component.emplace(), ComponentKind::estimator}.read(node); }
+  Json json() const {
+    Component copy = **component;
+    return ComponentField{copy, ComponentKind::estimator}.json();
+  }
+  void read(const JsonNode& node) const {
+    Component value;
+    ComponentField{value, ComponentKind::estimator}.read(node);
+    component.emplace(std::move(value));
+  }
   Json schema() const {
     Component any;
     return ComponentField{any, ComponentKind::estimator}.schema();

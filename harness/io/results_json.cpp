@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
 #include <set>
 
 #include "harness/io/claims_json.h"
@@ -11,6 +13,29 @@
 #include "harness/io/text.h"
 
 namespace nullmark {
+namespace {
+
+/// What cells have in common, equal specifications once, with labels that can be printed.
+template <class Spec>
+class Distinct {
+ public:
+  void share(Shared<Spec>& spec) {
+    std::vector<Shared<Spec>>& alike = of_label_[spec->label];
+    // Specifications are equal whatever their pointers or labels.
+    const auto at = std::find(alike.begin(), alike.end(), spec);
+    if (at != alike.end()) {
+      spec = *at;
+      return;
+    }
+    if (printable(spec->label) != spec->label) spec.edit([](Spec& one) { one.label = printable(one.label); });
+    alike.push_back(spec);
+  }
+
+ private:
+  std::map<std::string, std::vector<Shared<Spec>>> of_label_;  ///< as the file has it
+};
+
+}  // namespace
 
 void write_results(const RunRecord& run, const TextSink& to) {
   Json provenance = Json::object();
@@ -73,15 +98,17 @@ RunRecord read_results(const std::string& text, const std::string& file) {
   if (const std::size_t cells = top["cells"].json().size(); cells > kMostCells)
     top["cells"].fail(fmt::format("found {} cells; expected at most {}", cells, kMostCells));
   std::set<std::string> seen;
+  Distinct<Component> trackers, majorants, ray_sets;
+  Distinct<MediumSpec> media;
   for (const JsonNode& cell : top["cells"].elements()) {
     run.cells.push_back(read_cell(cell));
     CellRecord& record = run.cells.back();
     expect_consistent(record, cell);
-    for (std::string* name : {&record.cell.name, &record.cell.experiment, &record.cell.estimator.label}) *name = printable(*name);
-    const auto print = [](auto& spec) { spec.label = printable(spec.label); };
-    record.medium.edit(print);
-    record.majorant.edit(print);
-    record.ray_set.edit(print);
+    for (std::string* name : {&record.cell.name, &record.cell.experiment}) *name = printable(*name);
+    trackers.share(record.cell.estimator);
+    media.share(record.medium);
+    majorants.share(record.majorant);
+    ray_sets.share(record.ray_set);
     record.reason = one_line(record.reason);
     if (!seen.insert(record.cell.name).second)
       cell.fail(fmt::format("found \"{}\" a second time; expected each cell once", record.cell.name));

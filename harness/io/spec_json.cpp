@@ -23,13 +23,13 @@ void add_samples(Json& json, const Cell& cell) {
 
 /// The keys that decide the statistics.
 Json deciding_json(const Plan& plan, const Cell& cell) {
-  Json json = {{"estimator", component_json(cell.estimator)},
+  Json json = {{"estimator", component_json(*cell.estimator)},
                {"medium", medium_json(*plan.media[cell.medium])},
                {"majorant", component_json(*plan.majorants[cell.majorant])},
                {"rays", component_json(*plan.ray_sets[cell.rays])},
                {"quantity", to_string(cell.quantity)},
                {"measurement", fields_json(cell.measurement)}};
-  if (cell.minus) json["minus"] = component_json(*cell.minus);
+  if (cell.minus) json["minus"] = component_json(**cell.minus);
   if (cell.transport != TransportSpec{}) json["transport"] = transport_json(cell.transport);
   if (cell.precision != Precision::float64) json["precision"] = to_string(cell.precision);
   if (!cell.lanes) json["lanes"] = false;
@@ -98,7 +98,9 @@ std::string applied_config(const Plan& plan) {
   text += fmt::format(R"({}],"tables":{})", experiment ? "]}" : "", tables_json(plan.tables).dump());
   if (!plan.claims.empty()) text += fmt::format(R"(,"claims":{})", claims_json(plan.claims).dump());
   if (!plan.credits.empty()) text += fmt::format(R"(,"credits":{})", Json(plan.credits).dump());
-  return text + "}";
+  text += "}";
+  text.shrink_to_fit();  // it stays as long as the run
+  return text;
 }
 
 std::string config_hash(const std::string& config_text) { return hexadecimal(fnv1a(config_text)); }

@@ -71,7 +71,7 @@ TEST(Crossing, AForcedCutOfAHomogeneousMediumIsWasted) {
         EXPECT_EQ(one.structure->cells, 1u);
         EXPECT_GT(cut.structure->cells, 1u);
         EXPECT_NEAR(*one.lookups_theory, *cut.lookups_theory, 1e-12);
-        const bool is_ratio = one.cell.estimator.type == "ratio";
+        const bool is_ratio = one.cell.estimator->type == "ratio";
         if (std::string(rule) == "carry") {
           EXPECT_EQ(one.draws, cut.draws);
           continue;
@@ -97,7 +97,7 @@ TEST(Crossing, CostPredictsWhatThinWalksSpend) {
     const auto structure = make_majorant(*record.majorant)->build(build_medium(*record.medium).medium);
     const auto& tree = dynamic_cast<const TreeMajorant&>(*structure);
     EXPECT_GT(tree.size().cells, 1u) << record.cell.name;
-    const Real decisions = record.cell.estimator.type == "delta" ? *record.lookups_per_sample : 0;
+    const Real decisions = record.cell.estimator->type == "delta" ? *record.lookups_per_sample : 0;
     const Real spent = *record.draws_per_sample - decisions - 1;
     EXPECT_GT(tree.expected_cost() / spent, 0.9) << record.cell.name;
     EXPECT_LT(tree.expected_cost() / spent, 1.1) << record.cell.name;

@@ -126,10 +126,10 @@ struct Cell {
   std::string id;    ///< hash of everything that decides the statistics
   std::string name;  ///< "estimator/medium/majorant", unique in the plan (experiment and seed are prefixed where needed)
   std::string experiment;
-  Component estimator;
+  Shared<Component> estimator;
   /// A second tracker, on streams of its own, whose samples are subtracted: the difference has the mean 0 where both are
   /// unbiased.
-  std::optional<Component> minus{};
+  std::optional<Shared<Component>> minus{};
   std::size_t medium = 0, majorant = 0, rays = 0;
   Quantity quantity = Quantity::transmittance;
   Precision precision = Precision::float64;

@@ -151,7 +151,7 @@ Json cell_json_of(const CellRecord& record, std::size_t run, ReportImages& image
           {"name", cell.name},
           {"experiment", cell.experiment},
           {"estimator", tracker_label(cell)},
-          {"type", cell.estimator.type},
+          {"type", cell.estimator->type},
           {"claims", record.claims},
           {"unbiased", stands_unbiased(record)},
           {"precision", to_string(cell.precision)},

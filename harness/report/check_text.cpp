@@ -131,7 +131,7 @@ std::string cell_line(const CellRecord& record) {
 std::string group_line(const std::string& word, const std::vector<const CellRecord*>& cells) {
   constexpr std::size_t kNamed = 4;
   std::map<std::string, std::size_t> counts;
-  for (const CellRecord* record : cells) ++counts[record->cell.estimator.type];
+  for (const CellRecord* record : cells) ++counts[record->cell.estimator->type];
   std::vector<std::pair<std::size_t, std::string>> trackers;
   for (const auto& [tracker, count] : counts) trackers.emplace_back(count, tracker);
   std::sort(trackers.begin(), trackers.end(),

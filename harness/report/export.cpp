@@ -91,7 +91,7 @@ using Row = std::vector<std::pair<std::string, std::string>>;
 /// Of the components of a cell, by `estimator.NAME`, `medium.NAME`, `majorant.NAME` and `rays.NAME`.
 std::map<std::string, std::string> csv_parameters(const CellRecord& record) {
   std::map<std::string, std::string> parameters;
-  for (const auto& [part, component] : {std::pair("estimator", &record.cell.estimator),
+  for (const auto& [part, component] : {std::pair("estimator", &*record.cell.estimator),
                                         {"medium", &record.medium->field},
                                         {"majorant", &*record.majorant},
                                         {"rays", &*record.ray_set}}) {
@@ -112,8 +112,8 @@ Row csv_row(const CellRecord& record, std::size_t c) {
   return {{"id", cell.id},
           {"name", cell.name},
           {"experiment", cell.experiment},
-          {"estimator", cell.estimator.label},
-          {"minus", cell.minus ? cell.minus->label : ""},
+          {"estimator", cell.estimator->label},
+          {"minus", cell.minus ? (*cell.minus)->label : ""},
           {"medium", record.medium->label},
           {"majorant", record.majorant->label},
           {"ray_set", record.ray_set->label},

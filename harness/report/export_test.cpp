@@ -51,8 +51,10 @@ TEST(Export, CsvHasARowPerCellAndChannelAndQuotesWhatNeedsIt) {
 TEST(Export, CsvHasAColumnForEveryParameter) {
   RunRecord run = example_results();
   run.cells.resize(2);
-  run.cells[0].cell.estimator.values = {{"control", std::string("average")}, {"factor", Real{0.5}}};
-  run.cells[1].cell.estimator.values = {{"steps", 8}};
+  run.cells[0].cell.estimator.edit([](Component& one) {
+    one.values = {{"control", std::string("average")}, {"factor", Real{0.5}}};
+  });
+  run.cells[1].cell.estimator.edit([](Component& one) { one.values = {{"steps", 8}}; });
   run.cells[1].medium.edit([](MediumSpec& medium) { medium.field.values = {{"lo", std::array<Real, 3>{-1, 0, 0}}}; });
   std::istringstream lines(export_results(run, "csv", "r.json"));
   std::string heading, row;

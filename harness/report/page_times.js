@@ -53,9 +53,24 @@ function timesPlot(scene, width, theme) {
   };
 }
 
+/** ", 0.29 times the time of ratio": of the fastest cell, against the plain tracker that everyone knows. */
+function againstRatio(scene, cell) {
+  const ratio = cellsOf(scene).find((other) => other.type === "ratio" && reachesTheError(other));
+  if (!ratio || ratio === cell || !reachesTheError(cell)) return "";
+  return `, ${formatNumber(secondsTo(cell, 0).value / secondsTo(ratio, 0).value, 2)} times the time of ${ratio.label}`;
+}
+
+/** Who is the fastest that claims to be unbiased, what that costs, and what is proven of it. */
+function answerOf(scene) {
+  const cells = unbiasedWinnersOf(scene).map((entry) => report.cells[entry.cell]);
+  const each = cells.map((cell) => `${cell.label} (${formatSeconds(secondsTo(cell, 0).value)}${againstRatio(scene, cell)}; ${cell.marked_word})`);
+  return each.length === 0 ? "" : `Fastest that claims to be unbiased: ${each.join(", tied with ")}.`;
+}
+
 function timesCaption(scene) {
   const never = cellsOf(scene).filter((cell) => secondsTo(cell, 0)?.reached === false && hasCostAndTime(cell));
   return [
+    answerOf(scene),
     `${marksMeaning(cellsOf(scene).filter(reachesTheError))}.`,
     never.length > 0 ? `Never, because of a bias that no number of samples removes: ${listed(never.map(labelWithFloor))}.` : "",
     unprovenHint(cellsOf(scene).map((cell) => secondsTo(cell, 0))),

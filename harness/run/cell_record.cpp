@@ -117,9 +117,9 @@ CellRecord blank_record(const Plan& plan, const PreparedCell& prepared) {
   record.medium = plan.media[cell.medium];
   record.majorant = plan.majorants[cell.majorant];
   record.ray_set = plan.ray_sets[cell.rays];
-  const auto* entry = Registry<EstimatorEntry>::instance().find(cell.estimator.type);
+  const auto* entry = Registry<EstimatorEntry>::instance().find(cell.estimator->type);
   std::shared_ptr<const EstimatorSource> source = prepared.source;
-  if (!source && !entry->foreign) source = make_estimator(cell.estimator);
+  if (!source && !entry->foreign) source = make_estimator(*cell.estimator);
   if (source) {
     record.claims = to_string(source->claim(cell.quantity));
     record.range = to_string(entry->foreign ? prepared.range : entry->range);

@@ -26,7 +26,8 @@ std::string depth_of(const MediumSpec& medium) {
 
 Combinations combinations_of(const Plan& plan, const Cell& cell) {
   const MediumSpec& medium = *plan.media[cell.medium];
-  const std::string &estimator = cell.estimator.label, &type = medium.field.type, &majorant = plan.majorants[cell.majorant]->label;
+  const std::string &estimator = cell.estimator->label, &type = medium.field.type,
+                    &majorant = plan.majorants[cell.majorant]->label;
   return {fmt::format("estimator {} medium {}", estimator, type), fmt::format("medium {} majorant {}", type, majorant),
           fmt::format("estimator {} depth {}", estimator, depth_of(medium)),
           fmt::format("estimator {} majorant {} experiment {}", estimator, majorant, cell.experiment)};

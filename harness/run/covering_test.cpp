@@ -41,9 +41,9 @@ TEST(Covering, MeetsEveryCombinationOfTheSweep) {
       if (covering && !chosen[i]) continue;
       const Cell& cell = plan.cells[i];
       const std::string &type = plan.media[cell.medium]->field.type, &majorant = plan.majorants[cell.majorant]->label;
-      media[covering].insert({cell.estimator.label, type});
+      media[covering].insert({cell.estimator->label, type});
       bounds[covering].insert({type, majorant});
-      triples[covering].insert({cell.estimator.label, majorant, cell.experiment});
+      triples[covering].insert({cell.estimator->label, majorant, cell.experiment});
     }
   EXPECT_EQ(media[0], media[1]);
   EXPECT_EQ(bounds[0], bounds[1]);

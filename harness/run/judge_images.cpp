@@ -218,7 +218,7 @@ std::optional<JudgedImages> judge_images(const ProblemScene& scene, const std::s
   if (pictures.pictures() < kFewest)
     throw InputError(fmt::format("{}: found {} images; expected at least {}", samples, pictures.pictures(), kFewest));
   judged.plan = scene.plan(estimator, split_samples(pictures.pictures()).judged, samples);
-  const PictureSource source{judged.plan.cells[0].estimator.label, hash, range};
+  const PictureSource source{judged.plan.cells[0].estimator->label, hash, range};
   auto record = judge_pictures(judged.plan, whole, pictures, source, stop);
   if (!record) return std::nullopt;
   judged.record = *std::move(record);

@@ -21,7 +21,7 @@ std::vector<std::size_t> chosen_cells(const Plan& plan, const std::vector<bool>&
     if (selected[i]) all.push_back(i);
   if (all.size() <= kMostCells) return all;
   std::stable_sort(all.begin(), all.end(),
-                   [&](std::size_t a, std::size_t b) { return plan.cells[a].estimator.type < plan.cells[b].estimator.type; });
+                   [&](std::size_t a, std::size_t b) { return plan.cells[a].estimator->type < plan.cells[b].estimator->type; });
   std::vector<std::size_t> some;
   for (std::size_t k = 0; k < kMostCells; ++k) some.push_back(all[(2 * k + 1) * all.size() / (2 * kMostCells)]);
   std::sort(some.begin(), some.end());

@@ -152,7 +152,7 @@ class ProblemWriter {
       }
       Cell scene;
       scene.experiment = std::to_string(problem_.cells.size());
-      scene.estimator.type = "ratio";
+      scene.estimator = Component{"ratio", {}, "", ""};
       scene.medium = problem_.cells.size();
       scene.rays = cell.rays;
       scene.quantity = cell.quantity;

@@ -84,7 +84,7 @@ TEST(ReplaySample, StepsFollowFromTheirRandomNumbers) {
   for (const CellRecord& record : results.cells)
     for (std::uint64_t i = 0; i < 40; ++i) {
       const Replay sample = replay(results, record, {0, i});
-      const bool delta = record.cell.estimator.type == "delta";
+      const bool delta = record.cell.estimator->type == "delta";
       long double depth = 0, weight = 1;
       std::size_t drawn = 0;
       for (std::size_t s = 0; s < sample.walk.steps.size(); ++s) {

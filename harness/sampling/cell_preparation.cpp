@@ -80,8 +80,8 @@ PreparedCell CellPreparer::prepare(std::size_t index) {
 /// The kernel of a cell whose scene is built, and what its samples should average to.
 void CellPreparer::add_kernel(PreparedCell& prepared) {
   const Cell& cell = *prepared.cell;
-  add_tracker(prepared, cell.estimator);
-  if (cell.minus && prepared.reason.empty()) subtract(prepared, *cell.minus);
+  add_tracker(prepared, *cell.estimator);
+  if (cell.minus && prepared.reason.empty()) subtract(prepared, **cell.minus);
   if (!prepared.reason.empty()) return;
   prepared.targets = compute_targets(*prepared.scene, *prepared.kernel, cell.quantity,
                                      cell.minus ? std::optional<GivenReference>() : cell.reference);
@@ -268,9 +268,12 @@ PreparedCell unprepared(const Plan& plan, std::size_t index) {
 std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted,
                                       const std::function<bool()>& stop) {
   expect_rays_fit(plan, wanted);
-  std::vector<PreparedCell> cells;
+  std::vector<std::size_t> places;
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
-    if (wanted(i)) cells.push_back(stop() ? unprepared(plan, i) : preparer.prepare(i));
+    if (wanted(i)) places.push_back(i);
+  std::vector<PreparedCell> cells;
+  cells.reserve(places.size());
+  for (const std::size_t i : places) cells.push_back(stop() ? unprepared(plan, i) : preparer.prepare(i));
   return cells;
 }
 

@@ -21,9 +21,9 @@ TEST(Lengths, TheSweepFailsWhoForgetsThem) {
   std::set<std::pair<std::size_t, std::size_t>> taken;  // medium and rays, each with its tightest majorant
   std::vector<bool> wanted;
   for (Cell& cell : plan.cells) {
-    const bool ratio = cell.estimator.type == "ratio" && plan.media[cell.medium]->field.type != "vdb";
+    const bool ratio = cell.estimator->type == "ratio" && plan.media[cell.medium]->field.type != "vdb";
     wanted.push_back(ratio && taken.insert({cell.medium, cell.rays}).second);
-    if (wanted.back()) cell.estimator = {"planted_unit_length", {}, "planted_unit_length", ""};
+    if (wanted.back()) cell.estimator = Component{"planted_unit_length", {}, "planted_unit_length", ""};
   }
   std::size_t judged = 0;
   for (const CellRecord& record : run_untimed(plan, wanted)) {

@@ -315,7 +315,7 @@ bool exceeds_somewhere(const BuiltMedium& built, const MajorantStructure& majora
 
 std::uint64_t stream_key(const Cell& cell, const BuiltMedium& medium) {
   std::uint64_t key = fnv1a({reinterpret_cast<const char*>(&cell.seed), sizeof cell.seed}, medium.hash);
-  if (cell.own_streams) key = fnv1a(cell.estimator.label, key);
+  if (cell.own_streams) key = fnv1a(cell.estimator->label, key);
   return key;
 }
 

@@ -75,7 +75,7 @@ TEST_F(Plugin, ExampleKeepsItsClaimsAndServesEveryCommand) {
     ASSERT_EQ(record.status, Status::ok) << record.reason;
     EXPECT_EQ(record.majorant_violations, 0u);
     const auto samples = static_cast<Real>(record.samples);
-    newcomers += record.cell.estimator.type == "roulette_ratio";
+    newcomers += record.cell.estimator->type == "roulette_ratio";
     for (const ChannelRecord& channel : record.channel) {
       ASSERT_TRUE(channel.bias && channel.variance && channel.variance_theory);
       EXPECT_LT(std::abs(*channel.bias), 5.5 * std::sqrt(*channel.variance_theory / samples));

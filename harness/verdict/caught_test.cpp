@@ -70,7 +70,7 @@ std::string told(const CellRecord& record) {
 TEST(Caught, EveryPlantedBugByTheCheckItNames) {
   const auto records = run_all(1, R"({"max_samples_per_ray":10000000,"laws":"always"})");
   for (const CellRecord& record : records) {
-    const EstimatorEntry& bug = *Registry<EstimatorEntry>::instance().find(record.cell.estimator.type);
+    const EstimatorEntry& bug = *Registry<EstimatorEntry>::instance().find(record.cell.estimator->type);
     EXPECT_TRUE(caught(record, bug.caught_by)) << bug.name << " by " << bug.caught_by << ": " << told(record);
     const std::uint64_t samples = record.verdict ? record.verdict->samples_per_ray * record.rays : record.samples;
     std::printf("%-30s caught by %-13s %llu samples\n", bug.name.c_str(), bug.caught_by.c_str(),
@@ -94,7 +94,7 @@ TEST(Caught, NoBiasedBugPassesAtAnyOfAHundredSeeds) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed)
     for (const CellRecord& record : run_all(seed, R"({"max_samples_per_ray":200000,"laws":"never"})")) {
       const auto scene = std::find_if(std::begin(kPlantedScenes), std::end(kPlantedScenes),
-                                      [&](const PlantedScene& one) { return one.name == record.cell.estimator.type; });
+                                      [&](const PlantedScene& one) { return one.name == record.cell.estimator->type; });
       if (scene->relative_bias != 0) {
         EXPECT_TRUE(!record.verdict || record.verdict->unbiased != Outcome::pass) << record.cell.name << ", seed " << seed;
       }

@@ -61,7 +61,7 @@ void expect_agreement(const CellRecord& record) {
   ASSERT_EQ(record.status, Status::ok) << record.reason;
   EXPECT_EQ(record.majorant_violations, 0u);
   const auto samples = static_cast<Real>(record.samples);
-  const EstimatorEntry& tracker = *Registry<EstimatorEntry>::instance().find(record.cell.estimator.type);
+  const EstimatorEntry& tracker = *Registry<EstimatorEntry>::instance().find(record.cell.estimator->type);
   for (const ChannelRecord& channel : record.channel) {
     ASSERT_TRUE(channel.bias && channel.mean && channel.reference);
     const Real rounding = 1e-13 + *channel.reference_error;
@@ -220,7 +220,7 @@ TEST(Contract, ViolatedMajorantsAreCounted) {
       honest_estimators()));
   int audited = 0;
   for (const CellRecord& record : records) {
-    if (Registry<EstimatorEntry>::instance().find(record.cell.estimator.type)->ignores_majorant) continue;
+    if (Registry<EstimatorEntry>::instance().find(record.cell.estimator->type)->ignores_majorant) continue;
     EXPECT_GT(record.majorant_violations, 0u) << record.cell.name;
     EXPECT_NEAR(*record.largest_violation, 1 / 0.9, 1e-2) << record.cell.name;
     ++audited;

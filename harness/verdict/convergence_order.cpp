@@ -23,8 +23,8 @@ constexpr std::size_t kFewestSteps = 3;
 constexpr Real kPowerLaw = 5;
 
 std::string without_steps(const CellRecord& record) {
-  std::string label = record.cell.estimator.type;
-  for (const auto& [name, value] : record.cell.estimator.values)
+  std::string label = record.cell.estimator->type;
+  for (const auto& [name, value] : record.cell.estimator->values)
     if (name != "steps") label += fmt::format("/{}:{}", name, to_text(value));
   if (record.cell.precision != Precision::float64) label += "/" + to_string(record.cell.precision);
   return fmt::format("{}/{}/{}/{}", label, record.medium->label, to_string(record.cell.quantity), record.ray_set->label);
@@ -88,11 +88,11 @@ std::vector<OrderFit> fit_orders(const std::vector<CellRecord>& cells) {
   };
   std::map<std::string, Series> series;
   for (const CellRecord& record : cells) {
-    const auto steps = record.cell.estimator.values.find("steps");
+    const auto steps = record.cell.estimator->values.find("steps");
     // What is done to samples has a bias of its own.
     if (record.cell.measurement != Measurement{} || !record.outputs.empty()) continue;
     if (record.status != Status::ok || record.claims != "consistent" || !record.order || record.channel.empty() ||
-        steps == record.cell.estimator.values.end() || !std::holds_alternative<int>(steps->second))
+        steps == record.cell.estimator->values.end() || !std::holds_alternative<int>(steps->second))
       continue;
     const ChannelRecord& channel = record.channel.front();
     const std::optional<Real>& variance = best_variance(channel);

@@ -16,8 +16,7 @@ std::vector<CellRecord> marches(const std::vector<std::pair<int, Real>>& biases,
   std::vector<CellRecord> cells;
   for (const auto& [steps, bias] : biases) {
     CellRecord record = example_results().cells[0];
-    record.cell.estimator.type = "ray_marching";
-    record.cell.estimator.values = {{"steps", steps}, {"offset", std::string("left")}};
+    record.cell.estimator = Component{"ray_marching", {{"steps", steps}, {"offset", std::string("left")}}, "", ""};
     record.claims = "consistent";
     record.order = claimed;
     record.samples = 1'000'000;
@@ -89,7 +88,7 @@ TEST(Order, IsAClaimOfSmallSteps) {
 TEST(Order, SeriesDifferInNothingButTheirSteps) {
   std::vector<CellRecord> cells = marches(power(1, 0.01), 1);
   for (CellRecord other : marches(power(1, 0.03), 1)) {
-    other.cell.estimator.values["jitter"] = 0.5;
+    other.cell.estimator.edit([](Component& estimator) { estimator.values["jitter"] = 0.5; });
     cells.push_back(other);
   }
   ASSERT_EQ(fit_orders(cells).size(), 2u);

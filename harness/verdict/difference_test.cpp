@@ -93,7 +93,7 @@ TEST(Difference, SurvivesTheFile) {
   const RunRecord run = run_pairs(R"("ratio")", R"({"type":"residual_ratio","control":"average"})");
   const RunRecord again = read_results(results_text(run), "again.json");
   ASSERT_TRUE(again.cells[0].cell.minus);
-  EXPECT_EQ(again.cells[0].cell.minus->label, "residual_ratio/control:average");
+  EXPECT_EQ((*again.cells[0].cell.minus)->label, "residual_ratio/control:average");
   EXPECT_EQ(kind_of(again.cells[0]), Kind::agree);
 }
 

@@ -96,7 +96,7 @@ TEST(Planted, EachRunsOnGreyAndChromaticMediaAndOnEmptyRays) {
   EXPECT_EQ(records.size(), planted().size() * 8);
   for (const CellRecord& record : records) {
     EXPECT_EQ(record.status, Status::ok) << record.cell.name << ": " << record.reason;
-    EXPECT_EQ(record.claims, record.cell.estimator.type == "planted_exact" ? "exact" : "unbiased") << record.cell.name;
+    EXPECT_EQ(record.claims, record.cell.estimator->type == "planted_exact" ? "exact" : "unbiased") << record.cell.name;
   }
 }
 

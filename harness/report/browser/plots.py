@@ -1,5 +1,7 @@
 """Every plot is there and shows data."""
 
+import re
+
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
@@ -87,6 +89,23 @@ class PlotsTest(PageTest):
             self.assertEqual(plot["seconds"], sorted(plot["seconds"]))
             self.assertEqual(plot["rows"], list(range(len(plot["names"]))))
             self.assertEqual(len(plot["seconds"]), len(plot["names"]))
+
+    @once
+    def test_39_each_scene_says_who_is_fastest_and_what_is_proven_of_it(self):
+        if not timed():
+            self.skipTest("nothing was timed")
+        scenes = self.js("""return report.scenes.filter((scene) => cellsOf(scene).some(reachesTheError) && unbiasedWinnersOf(scene).length > 0).map((scene) => ({
+            said: timesCaption(scene), cells: unbiasedWinnersOf(scene).map((entry) => report.cells[entry.cell]),
+            ratio: cellsOf(scene).find((cell) => cell.type === "ratio")?.cost?.seconds[0].value ?? null }))""")
+        self.assertTrue(scenes)
+        for scene in scenes:
+            for cell in scene["cells"]:
+                self.assertIn(cell["label"], scene["said"])
+                self.assertIn(f"; {cell['marked_word']})", scene["said"])
+                told = re.search(re.escape(cell["label"]) + r" \([^;]*, ([\d.e−]+) times the time of ratio;", scene["said"])
+                if scene["ratio"] and cell["type"] != "ratio":
+                    share = cell["cost"]["seconds"][0]["value"] / scene["ratio"]
+                    self.assertAlmostEqual(float(told[1].replace("−", "-")) / share, 1, delta=0.06)
 
     @once
     def test_38_a_pass_of_an_own_mean_has_a_mark_of_its_own(self):
