@@ -292,10 +292,11 @@ std::string unproven_note(const Comparison& comparison) {
     least = std::min(least, ranked.possible_bias);
     most = std::max(most, ranked.possible_bias);
   }
-  if (!some) return unexcluded ? "not proven to be reachable: without a PASS no bias is excluded" : "";
+  if (!some) return unexcluded ? "this error may not be reached: without a PASS no bias is ruled out" : "";
   const std::string from = fmt::format("{:.2g}", 100 * least), to = fmt::format("{:.2g}", 100 * most);
-  return fmt::format("not proven to be reachable: PASS excludes a bias above {} % of the mean, and no smaller one{}",
-                     from == to ? to : fmt::format("{} to {}", from, to), unexcluded ? "; without a PASS none is excluded" : "");
+  return fmt::format("this error may not be reached: a PASS rules out only a bias above {} % of the mean{}",
+                     from == to ? to : fmt::format("{} to {}", from, to),
+                     unexcluded ? ", and without a PASS none is ruled out" : "");
 }
 
 std::vector<Comparison> comparisons(const std::vector<RunRecord>& runs, const std::string& baseline) {

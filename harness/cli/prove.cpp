@@ -17,6 +17,7 @@
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"
 #include "harness/registry/components.h"
+#include "harness/report/history_text.h"
 #include "harness/report/prove_text.h"
 #include "harness/run/battery.h"
 #include "harness/run/medium_contract.h"
@@ -105,7 +106,8 @@ ExitCode prove_command(const ProveCommand& command) {
   catch_signals();
   return run_battery(command, battery, [&](RunRecord run) {
     const Summary summary = summarise(run);
-    tell("estimator {}\n{}{}", estimator, members_text(battery.plan.cells[0].estimator->type), scenes_text(run));
+    tell("estimator {}: {}\n{}{}", estimator, verdicts_counted(run), members_text(battery.plan.cells[0].estimator->type),
+         scenes_text(run));
     for (const std::string& one : battery.left_out) tell("not tried: {}\n", one);
     tell("{}", findings_text(run));
     for (const std::string& one : summary.undecided_trackers) tell("{}\n", one);

@@ -133,7 +133,7 @@ std::string remedy(const PerformanceReport& report) {
 }  // namespace
 
 std::string performance_text(const PerformanceReport& report) {
-  std::string text = fmt::format("{}: {} against {}\n", report.name, report.after, report.before);
+  std::string text = fmt::format("{}: {}\n{} against {}\n", report.name, conclusion(report), report.after, report.before);
   std::vector<std::vector<std::string>> lines = {kHeading};
   for (const GateRow* row : by_gravity(report, false)) lines.push_back(words(*row));
   if (lines.size() > 1) text += aligned(lines, 3);
@@ -142,7 +142,7 @@ std::string performance_text(const PerformanceReport& report) {
   for (const std::string& line : left_out(report)) text += line + "\n";
   for (const std::string& line : missing(report)) text += line + "\n";
   if (const std::string line = remedy(report); !line.empty()) text += line + "\n";
-  return text + conclusion(report) + "\n";
+  return text;
 }
 
 std::string performance_markdown(const PerformanceReport& report) {

@@ -94,14 +94,14 @@ function secondsTo(cell, target) {
   return cell.cost?.seconds[target] ?? null;
 }
 
-/** The mark of a time to an error that is not proven to be reachable; the notes of the scenes say why. */
+/** The mark of a time to an error that may not be reached; the notes of the scenes say why. */
 function unprovenMark(time) {
   return time && time.reached !== false && time.proven === false ? "*" : "";
 }
 
 /** What stands below such marks, outside the rankings. */
 function unprovenHint(times) {
-  return times.some((time) => unprovenMark(time) !== "") ? "* not proven to be reachable: the rankings say why." : "";
+  return times.some((time) => unprovenMark(time) !== "") ? "* this error may not be reached: the rankings say why." : "";
 }
 
 /** The word that `nullmark check` counts a cell by. */

@@ -25,7 +25,6 @@ const outcomeMeanings = {
   DIFFER: "the means of two trackers differ: one of them is biased",
   INCONCLUSIVE: "neither bias nor its absence is proven, though the plan foresaw a decision",
   "INCONCLUSIVE (as planned)": "the plan said beforehand that no affordable number of samples decides",
-  "not tested": "the estimator claims nothing, nothing here can test its claim, or the configuration disables the verdict",
 };
 
 function violationsText() {
@@ -39,11 +38,15 @@ function outcomeMeaning(word) {
   return word === "VIOLATED" ? violationsText() : outcomeMeanings[word] ?? "see the reasons in the table of every cell";
 }
 
-/** What the marks of some cells mean, with their words. */
+/** What the marks of some cells mean, with their words; and why cells are not tested. */
 function marksMeaning(cells) {
-  return [...new Set(cells.map((cell) => markOf(cell) === ownMeanMark
-    ? `${ownMeanMark} PASS (own mean): the mean is the one that the tracker's theory predicts, which may be biased`
-    : `${markOf(cell)} ${outcomeOf(cell)}: ${outcomeMeaning(outcomeOf(cell))}`.trim()))].join("; ");
+  const meanings = cellsByWord(cells).flatMap(([word, of]) => {
+    if (word === "not tested") return [`${word}: ${listed([...new Set(of.map((cell) => cell.finding))], 2)}`];
+    const own = of.filter((cell) => markOf(cell) === ownMeanMark);
+    const plain = own.length < of.length ? [`${outcomeMarks[word] ?? ""} ${word}: ${outcomeMeaning(word)}`.trim()] : [];
+    return own.length > 0 ? [...plain, `${ownMeanMark} PASS (own mean): the mean is the one that the tracker's theory predicts, which may be biased`] : plain;
+  });
+  return meanings.join("; ");
 }
 
 const verdictWords = ["PASS", "FAIL", "AGREE", "DIFFER", "VIOLATED", "INCONCLUSIVE", "INCONCLUSIVE (as planned)", "ERROR", "not run", "not tested"];

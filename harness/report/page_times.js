@@ -73,7 +73,7 @@ function timesCaption(scene) {
     answerOf(scene),
     `${marksMeaning(cellsOf(scene).filter(reachesTheError))}.`,
     never.length > 0 ? `Never, because of a bias that no number of samples removes: ${listed(never.map(labelWithFloor))}.` : "",
-    unprovenHint(cellsOf(scene).map((cell) => secondsTo(cell, 0))),
+    cellsOf(scene).some((cell) => unprovenMark(secondsTo(cell, 0))) ? `* ${scene.unproven}.` : "",
   ].filter(Boolean).join(" ");
 }
 
