@@ -40,16 +40,6 @@ Cell concentrated(const PreparedCell& prepared, double rays_for_each) {
   return cell;
 }
 
-/// Samples per ray that a cell draws.
-std::uint64_t drawn(const PreparedCell& prepared, const TestPlan* plan) {
-  const std::uint64_t first = prepared.samples_per_ray;
-  if (!plan) return first;
-  std::uint64_t samples = std::max(first, plan->planned <= plan->affordable ? plan->planned : 0);
-  if (!plan->lookups.empty() && plan->tests.back().planned <= std::min(plan->affordable, std::max(first, plan->planned)))
-    samples = std::max(samples, plan->tests.back().planned);
-  return samples;
-}
-
 /// CPU seconds of a span of samples and of one more sample of each ray, measured by spans of two lengths.
 struct SpanCost {
   double span = 0, each = 0;
@@ -92,8 +82,7 @@ std::optional<TestPlan> tests_by_pilot(const PreparedCell& prepared, const TestL
   PreparedCell small = prepared;
   const std::uint64_t rays = std::max<std::uint64_t>(1, prepared.scene->rays->world.size());
   small.samples_per_ray = std::min(prepared.samples_per_ray, std::max(kLeast, kSamples / rays));
-  std::vector<KeptSamples> kept;
-  return tests_of(small, levels, kept, [] { return false; });
+  return tests_of(small, levels, draw_pilot(small, [] { return false; }));
 }
 
 void predict(const PreparedCell& prepared, const TestLevels& levels, double rays_for_each, Prediction& prediction) {
@@ -115,7 +104,7 @@ void predict(const PreparedCell& prepared, const TestLevels& levels, double rays
   else
     prediction.verdict = tests->undecidable.empty() ? "PASS" : "INCONCLUSIVE";
   if (tests) prediction.planned = static_cast<std::uint64_t>(std::ceil(static_cast<double>(tests->planned) / rays_for_each));
-  auto samples = static_cast<double>(drawn(whole, tests));
+  auto samples = static_cast<double>(tests ? expected_samples(whole, *tests) : whole.samples_per_ray);
   if (pilot && tests) samples += static_cast<double>(whole.samples_per_ray);
   if (tests) samples += samples_of_laws(whole, *tests);
   const SpanCost cost = span_cost(whole, tests, whole.samples_per_ray);
