@@ -46,7 +46,7 @@ void fields(A& a, Portion& p) {
 template <class A>
 void fields(A& a, CellTheory& t) {
   a(t.variance, t.squared_bias, t.bias, t.lookups, t.most_lookups, t.majorant_depth, t.unit_weights, t.ray_variance, t.ray_shift,
-    t.infinite_variance, t.ray_lookups, t.ray_lookups_variance);
+    t.infinite_variance, t.ray_lookups, t.ray_lookups_variance, t.work);
 }
 template <class A>
 void fields(A& a, Pilot& p) {

@@ -173,6 +173,15 @@ void expect_same_trackers(CellPreparer& preparer, const Records& finished) {
 
 std::string CellShare::text() const { return fmt::format("{}/{}", part + 1, parts); }
 
+bool has_samples(const CellRecord& record) {
+  return record.status == Status::ok || record.status == Status::error || !record.drawn_parts.empty();
+}
+
+bool is_kept(const CellRecord& record, const CellShare& share) {
+  if (record.drawn_parts.empty()) return record.status == Status::ok;
+  return record.build.empty() && (share.parts == 1 || record.part == share.text());
+}
+
 std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selected,
                                 const std::map<std::string, SharedRecord>& finished, const std::string& reason) {
   std::vector<CellRecord> records;
@@ -214,13 +223,20 @@ std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::v
   const std::function<bool()> ended = [&] { return stop() || late(); };
 
   Records records, drawn;
-  std::map<std::string_view, const CellRecord*> by_id;
-  for (const CellRecord& record : finished) by_id[record.cell.id] = &record;
-  for (std::size_t i = 0; i < plan.cells.size(); ++i)
-    if (const auto at = by_id.find(plan.cells[i].id); selected[i] && at != by_id.end()) {
-      const bool done = at->second->drawn_parts.empty() || share_of(options, i).parts > 1;
-      (done ? records : drawn)[i] = std::make_shared<CellRecord>(*at->second);
-    }
+  std::map<std::string_view, const CellRecord*> by_id, parts_by_name;
+  for (const CellRecord& record : finished) {
+    if (record.drawn_parts.empty())
+      by_id[record.cell.id] = &record;
+    else
+      parts_by_name[record.cell.name] = &record;
+  }
+  for (std::size_t i = 0; i < plan.cells.size(); ++i) {
+    if (!selected[i]) continue;
+    if (const auto at = by_id.find(plan.cells[i].id); at != by_id.end())
+      records[i] = std::make_shared<CellRecord>(*at->second);
+    else if (const auto parts = parts_by_name.find(plan.cells[i].name); parts != parts_by_name.end())
+      (share_of(options, i).parts > 1 ? records : drawn)[i] = std::make_shared<CellRecord>(*parts->second);
+  }
 
   PhaseClock clock(observer);
   const bool timing = options.timing && plan.timing.enabled;
@@ -240,7 +256,9 @@ std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::v
       },
       ended);
   clock.end("preparation");
-  for (PreparedCell& prepared : cells) prepared.theory_later = drawn.contains(prepared.index);
+  for (PreparedCell& prepared : cells)
+    prepared.theory_later = drawn.contains(prepared.index) ||
+                            (prepared.kernel && share_of(options, prepared.index).part > 0 && !needs_theory(prepared));
   add_theory(cells, ended);
   clock.end("theory");
   std::vector<CellOutcome> outcomes = run_cells(plan, cells, drawn, threads, options, observer, late, stop);

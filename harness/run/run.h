@@ -13,10 +13,13 @@
 
 namespace nullmark {
 
-/// A part of a cell: of its samples every `parts`-th portion, from number `part` on.
+/// A part of a cell's samples: one of each `parts` consecutive portions.
 struct CellShare {
   std::size_t part = 0, parts = 1;
 
+  /// Whether it has the portion, by its number among those of all spans.  Each group of portions begins with another part, so
+  /// that no part has the same column of every row of a picture.
+  bool has(std::size_t portion) const { return (portion + portion / parts) % parts == part; }
   std::string text() const;  ///< "2/4" for part 1
 };
 
@@ -56,6 +59,13 @@ struct RunObserver {
   std::function<void(const Phase&)> phase = [](const Phase&) {};
   std::function<void(const std::string&)> warning = [](const std::string&) {};
 };
+
+/// Whether a record holds samples: of a cell that was run, or of parts of one.
+bool has_samples(const CellRecord& record);
+
+/// Whether a run of that share of a cell can use a record of an earlier run: a whole cell's, or the same part's; for a whole cell
+/// also those of any parts.  Parts that another build drew are drawn again.
+bool is_kept(const CellRecord& record, const CellShare& share);
 
 /// Why cells were not run.
 inline constexpr const char *kInterrupted = "interrupted", *kBudgetSpent = "time budget spent";

@@ -29,7 +29,8 @@ std::optional<CellDraws> stored_draws(const CellTask& task) {
   if (!task.drawn || task.drawn->drawn_parts.empty()) return std::nullopt;
   const std::string where = fmt::format("cell \"{}\"", task.drawn->cell.name);
   CellDraws all = read_draws(task.drawn->drawn_parts[0], where);
-  for (std::size_t i = 1; i < task.drawn->drawn_parts.size(); ++i) join(all, read_draws(task.drawn->drawn_parts[i], where), where);
+  for (std::size_t i = 1; i < task.drawn->drawn_parts.size(); ++i)
+    join(all, read_draws(task.drawn->drawn_parts[i], where), where);
   if (all.cell != task.prepared.cell->id) throw InputError(where + ": found samples of another cell; run its shard again");
   return all;
 }
@@ -223,11 +224,10 @@ class CellRun {
     const std::uint64_t wanted = tests_ ? expected_samples(prepared_, *tests_) : prepared_.samples_per_ray;
     std::size_t before = 0;  // portions of earlier spans
     for (SampleSpan span = first_span(); span.per_ray > 0;) {
-      const std::size_t parts = task_.share.parts, portions = SpanCut(prepared_.scene->rays->local.size(), span).portions();
-      auto drawn = draw(span, [&](std::size_t number) { return (before + number) % parts == task_.share.part; });
+      auto drawn = draw(span, [&](std::size_t number) { return task_.share.has(before + number); });
       if (!drawn) return false;
       draws.spans[span.first] = {span.per_ray, std::move(*drawn)};
-      before += portions;
+      before += SpanCut(prepared_.scene->rays->local.size(), span).portions();
       const std::uint64_t end = span.first + span.per_ray;
       span = tests_ && end < wanted ? next_span(*tests_, end) : SampleSpan();
     }

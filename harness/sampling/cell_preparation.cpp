@@ -265,6 +265,11 @@ PreparedCell unprepared(const Plan& plan, std::size_t index) {
   return prepared;
 }
 
+bool is_from_outside(const Cell& cell) {
+  const auto outside = [](const Component& tracker) { return Registry<EstimatorEntry>::instance().find(tracker.type)->foreign; };
+  return outside(cell.estimator) || (cell.minus && outside(*cell.minus));
+}
+
 std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted,
                                       const std::function<bool()>& stop) {
   expect_rays_fit(plan, wanted);

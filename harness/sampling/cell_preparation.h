@@ -75,6 +75,9 @@ class CellPreparer {
   std::map<const Scene*, Real> deepest_;  ///< largest majorant depth of a ray, if it was needed
 };
 
+/// Whether a tracker of the cell is from outside of nullmark.
+bool is_from_outside(const Cell& cell);
+
 /// A cell of which nothing is built yet.
 PreparedCell unprepared(const Plan& plan, std::size_t index);
 

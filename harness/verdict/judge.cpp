@@ -220,6 +220,11 @@ std::string why_not_judged(const PreparedCell& prepared) {
   return "";
 }
 
+bool needs_theory(const PreparedCell& prepared) {
+  // A consistent estimator's claim is a prediction of theory.
+  return prepared.cell->equal_lookups || prepared.claim == Guarantee::consistent || why_not_judged(prepared).empty();
+}
+
 bool tests_nothing(const PreparedCell& prepared) {
   const std::vector<Real>& depth = prepared.scene->reference->depth;
   return prepared.cell->quantity != Quantity::radiance &&

@@ -40,6 +40,9 @@ struct Families {
 /// Why a cell has no verdict; empty if it has one.
 std::string why_not_judged(const PreparedCell& prepared);
 
+/// Whether theory decides how a cell is sampled: its number of samples or its tests.
+bool needs_theory(const PreparedCell& prepared);
+
 /// Whether no ray meets any extinction.  Then any tracker is right.  Light can still meet surfaces.
 bool tests_nothing(const PreparedCell& prepared);
 
