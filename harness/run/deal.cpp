@@ -15,10 +15,26 @@ namespace {
 /// Of large pictures so many rays stand for all.
 constexpr std::size_t kDealtRays = 8;
 
-/// Nanoseconds of a sample and of a lookup, in registers side by side and one by one; of theory, for a ray and for a point that
-/// it looks at; of preparing a cell.  What they are on one machine; only their ratios matter.
-constexpr double kSampleInLanes = 16, kLookupInLanes = 6, kSample = 80, kLookup = 20;
+/// Nanoseconds of a sample, and for each of its lookups; of a light path for each of its random numbers.  What they are on one
+/// machine; only their ratios matter.
+struct Rates {
+  double sample, each;
+};
+constexpr Rates kInLanes{20, 6.5}, kInLanesLocal{40, 6.5}, kAlone{100, 11}, kLight{80, 30}, kLightLocal{80, 42};
+/// Of theory, for a ray and for a point that it looks at; of preparing a cell.
 constexpr double kTheoryOfRay = 2e4, kTheoryOfPoint = 40, kOfCell = 1e6;
+
+/// Of one sample, by the counts of some.
+double sample_cost(const PreparedCell& prepared, const Counters& counts) {
+  const bool local = prepared.scene->majorant->structure->size().cells > 1;
+  const auto samples = static_cast<double>(std::max<std::uint64_t>(1, counts.samples));
+  if (prepared.cell->quantity == Quantity::radiance) {
+    const Rates& rates = local ? kLightLocal : kLight;
+    return rates.sample + rates.each * static_cast<double>(counts.draws) / samples;
+  }
+  const Rates& rates = !prepared.kernel->in_lanes(prepared.cell->quantity) ? kAlone : local ? kInLanesLocal : kInLanes;
+  return rates.sample + rates.each * static_cast<double>(counts.lookups) / samples;
+}
 
 double timing_cost(const TimingPlan& timing) {
   constexpr double kNanoseconds = 1e9;
@@ -31,11 +47,7 @@ CellCost cost_of(const PreparedCell& prepared, const TestLevels& levels, std::ui
   const auto all = static_cast<double>(rays);
   const double stands_for = all / static_cast<double>(std::max<std::size_t>(1, prepared.scene->rays->world.size()));
   const Demand demand(prepared, levels, stands_for);
-  const bool lanes = prepared.kernel->in_lanes(prepared.cell->quantity);
-  const double lookups =
-      static_cast<double>(demand.probe.lookups) / static_cast<double>(std::max<std::uint64_t>(1, demand.probe.samples));
-  const double sample = (lanes ? kSampleInLanes : kSample) + (lanes ? kLookupInLanes : kLookup) * lookups;
-  const double of_each = sample * static_cast<double>(prepared.scene->rays->world.size());
+  const double of_each = sample_cost(prepared, demand.probe) * static_cast<double>(prepared.scene->rays->world.size());
   const double theory = all * (kTheoryOfRay + kTheoryOfPoint * prepared.theory.work);
   CellCost cost;
   cost.spread = of_each * demand.samples;
@@ -45,6 +57,16 @@ CellCost cost_of(const PreparedCell& prepared, const TestLevels& levels, std::ui
   const auto per_ray = static_cast<std::uint64_t>(demand.samples / stands_for);
   cost.portions = SpanCut(static_cast<std::size_t>(rays), {.per_ray = std::max<std::uint64_t>(1, per_ray)}).portions();
   return cost;
+}
+
+/// Parts of a cell: small ones, so that errors of the forecast even out, where what each part does for itself is little beside
+/// its samples; large ones otherwise.
+std::size_t parts_of(const CellCost& cost, double mean, std::size_t shards) {
+  constexpr double kSmall = 1. / 32, kLarge = 1. / 8, kLittle = 0.05;
+  const double small = cost.spread / (kSmall * mean), large = cost.spread / (kLarge * mean);
+  const double cheap = kLittle * cost.spread / std::max(cost.each, 1.);
+  const double most = static_cast<double>(std::min(shards, std::max<std::size_t>(1, cost.portions)));
+  return static_cast<std::size_t>(std::clamp(std::ceil(std::max(large, std::min(small, cheap))), 1., most));
 }
 
 }  // namespace
@@ -70,12 +92,10 @@ std::size_t Deal::split_cells() const {
 }
 
 Deal deal_costs(const std::vector<std::optional<CellCost>>& costs, std::size_t shards) {
-  /// A cell, or a part of one, costs at most this share of a shard's mean load, where its portions allow.
-  constexpr double kMostShare = 1. / 32;
   double total = 0;
   for (const auto& cost : costs)
     if (cost) total += cost->spread + cost->each + cost->once;
-  const double most = kMostShare * total / static_cast<double>(shards);
+  const double mean = total / static_cast<double>(shards);
   std::vector<std::tuple<double, std::size_t, std::size_t>> parts;  // cost, cell, part
   Deal deal;
   deal.shard_of.resize(costs.size());
@@ -83,11 +103,7 @@ Deal deal_costs(const std::vector<std::optional<CellCost>>& costs, std::size_t s
   for (std::size_t i = 0; i < costs.size(); ++i) {
     if (!costs[i]) continue;
     const CellCost& cost = *costs[i];
-    const double wanted = cost.spread > most ? std::ceil(cost.spread / most) : 1;
-    // A part that does less for the samples than for itself pays no more.
-    const double worth = std::max(1., cost.spread / std::max(cost.each, 1.));
-    const auto count = static_cast<std::size_t>(
-        std::min({wanted, worth, static_cast<double>(shards), static_cast<double>(std::max<std::size_t>(1, cost.portions))}));
+    const std::size_t count = parts_of(cost, mean, shards);
     deal.shard_of[i].resize(count);
     for (std::size_t part = 0; part < count; ++part) {
       const double portions =
