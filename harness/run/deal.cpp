@@ -13,7 +13,7 @@ namespace nullmark {
 namespace {
 
 /// Of large pictures so many rays stand for all.
-constexpr std::size_t kDealtRays = 8;
+constexpr std::size_t kDealtRays = 16;
 
 /// Nanoseconds of a sample, and for each of its lookups; of a light path for each of its random numbers.  What they are on one
 /// machine; only their ratios matter.
@@ -22,7 +22,7 @@ struct Rates {
 };
 constexpr Rates kInLanes{20, 6.5}, kInLanesLocal{40, 6.5}, kAlone{100, 11}, kLight{80, 30}, kLightLocal{80, 42};
 /// Of theory, for a ray and for a point that it looks at; of preparing a cell.
-constexpr double kTheoryOfRay = 2e4, kTheoryOfPoint = 40, kOfCell = 1e6;
+constexpr double kTheoryOfRay = 5e3, kTheoryOfPoint = 40, kOfCell = 1e6;
 
 /// Of one sample, by the counts of some.
 double sample_cost(const PreparedCell& prepared, const Counters& counts) {

@@ -36,14 +36,14 @@ Counters few_samples(const PreparedCell& prepared) {
   const std::uint64_t per_ray = std::max(kLeast, kSamples / std::max<std::uint64_t>(1, prepared.scene->rays->world.size()));
   const auto sampled = sample_cell(
       prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-      {.first = first_sample::kPilot, .per_ray = std::min(per_ray, prepared.samples_per_ray), .only_evidence = true}, nullptr,
-      [] { return false; }, [](double) {});
+      {.per_ray = std::min(per_ray, prepared.samples_per_ray), .only_evidence = true}, nullptr, [] { return false; },
+      [](double) {});
   return sampled->counters;
 }
 
 /// The tests of a cell whose variance theory does not state, from a pilot smaller than the run's.
 std::optional<TestPlan> tests_by_pilot(const PreparedCell& prepared, const TestLevels& levels, const Counters& probe) {
-  constexpr std::uint64_t kSamples = 8192, kLeast = 16, kLookups = 1 << 20;
+  constexpr std::uint64_t kSamples = 4096, kLeast = 16, kLookups = 1 << 20;
   PreparedCell small = prepared;
   const std::uint64_t rays = std::max<std::uint64_t>(1, prepared.scene->rays->world.size());
   const std::uint64_t each = probe.lookups / std::max<std::uint64_t>(1, probe.samples) + 1;
