@@ -9,8 +9,8 @@
 #include "harness/config/config.h"
 #include "harness/io/json_input.h"
 #include "harness/io/notice.h"
-#include "harness/registry/components.h"
 #include "harness/run/run.h"
+#include "harness/sampling/cell_preparation.h"
 
 namespace nullmark {
 

@@ -66,7 +66,9 @@ std::map<std::string, Found> found_cells(const std::vector<RunRecord>& parts, co
       if (sampled(record) && sampled(other) && statistics_of(record) != statistics_of(other))
         throw InputError(fmt::format("{}: cell \"{}\" has other statistics than in {}; expected the same to the last bit",
                                      names[part], record.cell.name, names[at->second.part]));
-      if (const CellRecord* best = better(at->second.record, &record); best == &record) at->second = {best, part};
+      if (better(at->second.record, &record) != &record) continue;
+      at->second.record = &record;
+      at->second.part = part;
     }
   }
   return cells;
