@@ -66,7 +66,7 @@ TEST_F(Shards, AKilledShardKeepsItsParts) {
     journal.append(part_of(first));
   }
   ASSERT_EQ(run("run c.json --shard 1/3 --resume"), 0) << read("err");
-  EXPECT_EQ(read("err").find(part_of(first).cell.name + ": part"), std::string::npos) << "drawn again";
+  EXPECT_EQ(read("err").find("] " + part_of(first).cell.name + ": part"), std::string::npos) << "drawn again";
   EXPECT_EQ(part_of(results("c.1-of-3.results.json")).drawn_parts, part_of(first).drawn_parts);
   ASSERT_EQ(run("merge c.1-of-3.results.json c.2-of-3.results.json c.3-of-3.results.json -o m.json"), 0) << read("err");
   EXPECT_EQ(statistics("m.json"), statistics("whole.json"));

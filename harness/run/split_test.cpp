@@ -23,7 +23,7 @@
 namespace nullmark {
 namespace {
 
-Plan plan_of(const std::string& experiments, int seed = 1) {
+Plan split_plan(const std::string& experiments, int seed = 1) {
   return read_config(fmt::format(R"({{"nullmark":"config/2","name":"split","seed":{},"timing":{{"enabled":false}},
                                      "experiments":[{}]}})",
                                  seed, experiments),
@@ -117,7 +117,7 @@ constexpr Example kExamples[] = {
 TEST(SplitCells, MergedPartsAreTheWholeRunToTheLastBit) {
   for (const Example& example : kExamples) {
     SCOPED_TRACE(example.name);
-    const Plan plan = plan_of(example.experiment);
+    const Plan plan = split_plan(example.experiment);
     const std::string expected = whole(plan);
     for (const std::size_t parts : {2, 3, 16}) {
       SCOPED_TRACE(parts);
@@ -129,7 +129,7 @@ TEST(SplitCells, MergedPartsAreTheWholeRunToTheLastBit) {
 }
 
 const Plan& grey() {
-  static const Plan plan = plan_of(kExamples[0].experiment);
+  static const Plan plan = split_plan(kExamples[0].experiment);
   return plan;
 }
 
@@ -172,15 +172,16 @@ TEST(SplitCells, AVerdictMayAskForMoreThanIsDrawn) {
   // The spans of several seeds: in some the planned samples do not suffice.
   std::size_t open = 0;
   for (int seed = 1; seed <= 20; ++seed) {
-    const Plan plan = plan_of(R"({"name":"more","rays":{"type":"single"},"samples_per_ray":1024,
+    const Plan plan = split_plan(R"({"name":"more","rays":{"type":"single"},"samples_per_ray":1024,
         "verdict":{"epsilon":0.02,"max_samples_per_ray":1000000,"laws":"never"},
         "matrix":{"estimator":["delta","ratio"],"medium":{"type":"linear","optical_depth":1}}})",
-                              seed);
+                                 seed);
     const Merged part = merged(shards(plan, 2));
     open += part.open.size();
-    for (const CellRecord& record : part.run.cells)
-      if (record.status == Status::not_run)
-        EXPECT_NE(record.reason.find("which no part has drawn; `run --resume`"), std::string::npos) << record.reason;
+    for (const CellRecord& record : part.run.cells) {
+      if (record.status == Status::ok) continue;
+      EXPECT_NE(record.reason.find("which no part has drawn; `run --resume`"), std::string::npos) << record.reason;
+    }
     RunOptions options;
     options.timing = false;
     const std::vector<bool> everything(plan.cells.size(), true);
@@ -251,7 +252,7 @@ TEST(SplitCells, PartsMayOverlap) {
 }
 
 TEST(SplitCells, PartsOfAnotherSeedAreRefused) {
-  const Plan other = plan_of(kExamples[0].experiment, 2);
+  const Plan other = split_plan(kExamples[0].experiment, 2);
   EXPECT_NE(refusal({shard(grey(), 0, 2), shard(other, 1, 2)}).find("/config: found the configuration"), std::string::npos);
 }
 
@@ -267,6 +268,7 @@ TEST(Deals, LoadsAreEven) {
       costs.push_back(CellCost{cost, cost / 1000, cost / 100, 4096});
       total += cost;
     }
+    total -= costs[5]->spread;
     costs[5].reset();
     const Deal dealt = deal_costs(costs, shards);
     EXPECT_TRUE(dealt.shard_of[5].empty());
@@ -275,7 +277,7 @@ TEST(Deals, LoadsAreEven) {
       sum += load;
       EXPECT_LE(load, kMost * total / static_cast<double>(shards));
     }
-    EXPECT_GE(sum, total - costs[4]->spread);
+    EXPECT_GE(sum, total);
     for (std::size_t i = 0; i < costs.size(); ++i) {
       std::vector<std::size_t> of_cell = dealt.shard_of[i];
       std::sort(of_cell.begin(), of_cell.end());
@@ -293,7 +295,7 @@ TEST(Deals, LoadsAreEven) {
 
 /// What the forecast says is what is drawn: lookups of the shards of a configuration whose largest cell is most of it.
 TEST(Deals, ShardsDrawEqualCounts) {
-  const Plan plan = plan_of(R"({"name":"large","rays":{"type":"orthographic","width":64,"height":64},"samples_per_ray":256,
+  const Plan plan = split_plan(R"({"name":"large","rays":{"type":"orthographic","width":64,"height":64},"samples_per_ray":256,
         "matrix":{"estimator":"ratio","medium":{"type":"cosine","optical_depth":4}}},
       {"name":"small","rays":{"type":"chords","count":8},"samples_per_ray":512,
         "matrix":{"estimator":["ratio","delta","next_flight_ratio"],"medium":{"type":"cosine","optical_depth":[0.5,1,2,4]}}})");
