@@ -4,12 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+#include <csignal>
 #include <filesystem>
+#include <string>
+#include <thread>
 
 #include "harness/io/json_input.h"
 #include "harness/model/exit_code.h"
 #include "harness/run/build.h"
 #include "harness/run/journal.h"
+#include "harness/testing/ended_run.h"
 #include "harness/testing/program.h"
 
 namespace nullmark {
@@ -20,7 +25,7 @@ class Shards : public ProgramTest {
   void SetUp() override {
     ProgramTest::SetUp();
     write("c.json", R"({"nullmark":"config/2","timing":{"repetitions":2,"seconds":0.0005},"experiments":[
-      {"name":"large","rays":{"type":"orthographic","width":64,"height":64},"samples_per_ray":128,"images":true,
+      {"name":"large","rays":{"type":"orthographic","width":64,"height":64},"samples_per_ray":512,"images":true,
        "matrix":{"estimator":["ratio","next_flight_ratio"],"medium":{"type":"cosine","optical_depth":3}}},
       {"name":"small","rays":{"type":"chords","count":4},"samples_per_ray":64,
        "matrix":{"estimator":["ratio","delta"],"medium":"linear"}}]})");
@@ -70,6 +75,29 @@ TEST_F(Shards, AKilledShardKeepsItsParts) {
   EXPECT_EQ(part_of(results("c.1-of-3.results.json")).drawn_parts, part_of(first).drawn_parts);
   ASSERT_EQ(run("merge c.1-of-3.results.json c.2-of-3.results.json c.3-of-3.results.json -o m.json"), 0) << read("err");
   EXPECT_EQ(statistics("m.json"), statistics("whole.json"));
+}
+
+TEST_F(Shards, AShardThatIsKilledGoesOnAfterItsParts) {
+  write("k.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
+      {"name":"k","rays":{"type":"orthographic","width":64,"height":64},"verdict":{"enabled":false},
+       "matrix":{"samples_per_ray":[256,8192],"estimator":"ratio","medium":{"type":"cosine","optical_depth":3}}}]})");
+  const auto journal = [&] {
+    return std::filesystem::exists(folder_ / "k.1-of-2.results.json.journal") ? read("k.1-of-2.results.json.journal")
+                                                                              : std::string();
+  };
+  {
+    Process first(folder_, {"run", "k.json", "--shard", "1/2", "--threads", "1"});
+    while (journal().find("\"drawn_parts\":") == std::string::npos) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    first.signal(SIGKILL);
+    first.wait();
+  }
+  ASSERT_FALSE(std::filesystem::exists(folder_ / "k.1-of-2.results.json")) << "it had ended before it was killed";
+  ASSERT_EQ(run("run k.json --shard 1/2 --resume"), 0) << read("err");
+  EXPECT_NE(read("err").find("[1/1]"), std::string::npos) << read("err");
+  ASSERT_EQ(run("run k.json --shard 2/2"), 0) << read("err");
+  ASSERT_EQ(run("merge k.1-of-2.results.json k.2-of-2.results.json -o m.json"), 0) << read("err");
+  ASSERT_EQ(run("run k.json -o all.json"), 0) << read("err");
+  EXPECT_EQ(statistics("m.json"), statistics("all.json"));
 }
 
 TEST_F(Shards, AMissingShardLeavesCellsThatResumeDraws) {

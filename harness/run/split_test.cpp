@@ -141,6 +141,14 @@ TEST(SplitCells, ALonePartIsNoVerdict) {
     EXPECT_EQ(record.drawn_parts.size(), 1u);
     EXPECT_FALSE(record.verdict);
     EXPECT_EQ(record.reason, "part 2/3 of the cell is drawn; `merge` joins the parts");
+    EXPECT_TRUE(has_samples(record));
+    EXPECT_TRUE(is_kept(record, {1, 3})) << "by the same shard";
+    EXPECT_TRUE(is_kept(record, {})) << "by a run of the whole cell";
+    EXPECT_FALSE(is_kept(record, {0, 3}));
+    EXPECT_FALSE(is_kept(record, {1, 2}));
+    CellRecord elsewhere = record;
+    elsewhere.build = "another compiler";
+    EXPECT_FALSE(is_kept(elsewhere, {1, 3}));
   }
 }
 
