@@ -56,10 +56,10 @@ class CellRun {
       return outcome_;
     }
     stored_ = stored_draws(task_);
-    if (stop_() || !prepare() || !(task_.share.parts > 1 ? draw_part() : judge_whole())) {
-      if (record_.status == Status::not_run && !open_) record_.reason = why_stopped();
-      if (task_.drawn) record_.drawn_parts = task_.drawn->drawn_parts;
-    }
+    const bool done = !stop_() && prepare() && (task_.share.parts > 1 ? draw_part() : judge_whole());
+    if (done || record_.status != Status::not_run) return outcome_;
+    if (!open_) record_.reason = why_stopped();
+    if (task_.drawn) record_.drawn_parts = task_.drawn->drawn_parts;
     return outcome_;
   }
 
