@@ -81,17 +81,17 @@ TEST_F(Shards, AShardThatIsKilledGoesOnAfterItsParts) {
   write("k.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
       {"name":"k","rays":{"type":"orthographic","width":64,"height":64},"verdict":{"enabled":false},
        "matrix":{"samples_per_ray":[256,8192],"estimator":"ratio","medium":{"type":"cosine","optical_depth":3}}}]})");
-  const auto journal = [&] {
-    return std::filesystem::exists(folder_ / "k.1-of-2.results.json.journal") ? read("k.1-of-2.results.json.journal")
-                                                                              : std::string();
+  const auto results_file = folder_ / "k.1-of-2.results.json", journal_file = folder_ / "k.1-of-2.results.json.journal";
+  const auto holds_a_part = [&] {
+    return std::filesystem::exists(journal_file) && read(journal_file.filename()).find("\"drawn_parts\":") != std::string::npos;
   };
   {
     Process first(folder_, {"run", "k.json", "--shard", "1/2", "--threads", "1"});
-    while (journal().find("\"drawn_parts\":") == std::string::npos) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    while (!holds_a_part() && !std::filesystem::exists(results_file)) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     first.signal(SIGKILL);
     first.wait();
   }
-  ASSERT_FALSE(std::filesystem::exists(folder_ / "k.1-of-2.results.json")) << "it had ended before it was killed";
+  ASSERT_FALSE(std::filesystem::exists(results_file)) << "it had ended before its journal held a part";
   ASSERT_EQ(run("run k.json --shard 1/2 --resume"), 0) << read("err");
   EXPECT_NE(read("err").find("[1/1]"), std::string::npos) << read("err");
   ASSERT_EQ(run("run k.json --shard 2/2"), 0) << read("err");
