@@ -12,6 +12,7 @@
 
 #include "harness/config/config.h"
 #include "harness/io/json_input.h"
+#include "harness/io/packing.h"
 #include "harness/io/results_json.h"
 #include "harness/run/cell_draws.h"
 #include "harness/run/deal.h"
@@ -98,7 +99,7 @@ constexpr Example kExamples[] = {
     {"exact", R"({"name":"exact","rays":{"type":"chords","count":9},"samples_per_ray":4,
         "matrix":{"estimator":"regular","medium":{"type":"linear","optical_depth":2}}})"},
     {"laws", R"({"name":"laws","rays":{"type":"chords","count":8},"samples_per_ray":256,"verdict":{"laws":"always"},
-        "matrix":{"estimator":["ratio","delta","p_series_cumulative"],"medium":{"type":"cosine","optical_depth":6}}})"},
+        "matrix":{"estimator":["ratio","delta","ratio_roulette"],"medium":{"type":"cosine","optical_depth":6}}})"},
     {"free paths", R"({"name":"flights","rays":{"type":"chords","count":8},"quantity":"free_path","samples_per_ray":512,
         "matrix":{"estimator":["delta","weighted_decomposition"],"medium":{"type":"cosine","optical_depth":2,"albedo":0.5}}})"},
     {"equal lookups", R"({"name":"equal","rays":{"type":"chords","count":8},"equal_lookups":5000,
@@ -229,6 +230,14 @@ TEST(SplitCells, DamagedAndForeignPartsAreRefused) {
   EXPECT_EQ(with([](std::string& text) { std::swap(text[text.size() / 2], text[text.size() / 3]); }), damaged);
   EXPECT_EQ(with([](std::string& text) { text = "!!"; }), damaged);
   EXPECT_EQ(with([](std::string& text) { text.clear(); }), damaged);
+  // Sound as a gzip file, with fewer or more bytes than were written.
+  for (const int more : {-1, 1})
+    EXPECT_EQ(with([&](std::string& text) {
+                std::string bytes = *unpacked(text, std::size_t{1} << 30);
+                bytes.resize(bytes.size() + static_cast<std::size_t>(more));
+                text = packed(bytes);
+              }),
+              damaged);
   EXPECT_EQ(with([&](std::string& text) { text = good[1].cells[1].drawn_parts[0]; }),
             cell + "found samples of another cell; run the shard again");
   const auto edited = [&](const auto& change) {
@@ -249,6 +258,18 @@ TEST(SplitCells, DamagedAndForeignPartsAreRefused) {
               portions[0] = portions.begin()->second;
             }).find("other samples than in another part"),
             std::string::npos);
+}
+
+/// Parts that agree with each other, and not with what is planned where they are merged.
+TEST(SplitCells, PartsOfOtherTestsAreRefused) {
+  std::vector<RunRecord> parts = shards(grey(), 2);
+  for (RunRecord& part : parts) {
+    CellDraws draws = read_draws(part.cells[0].drawn_parts[0], "part");
+    draws.plan ^= 1;
+    part.cells[0].drawn_parts[0] = draws_text(draws);
+  }
+  EXPECT_EQ(refusal(parts), "cell \"" + parts[0].cells[0].cell.name +
+                                "\": found samples drawn for other tests than are planned here; run its shards again");
 }
 
 /// The same part twice, or parts of two dealings, are no contradiction.
