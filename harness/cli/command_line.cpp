@@ -307,10 +307,7 @@ class CommandLine {
 
   void add_merge() {
     CLI::App* command = add("merge", "Join the results of shards", [this] {
-      refuse_overwriting(files_, {output_});
-      expect_new(output_, force_, kResultsBeginning);
-      deliver(results_text(merge_results(load_all(files_), files_, builds_of(builds_))), output_);
-      return ExitCode::ok;
+      return merge_command({files_, output_, builds_, force_});
     });
     command->add_option("PART", files_, "Results files of the shards of one configuration")->required();
     command->add_option("-o,--output", output_, "Results file; - for standard output")->required();

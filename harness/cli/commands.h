@@ -100,6 +100,14 @@ struct HistoryCommand {
 };
 ExitCode history_command(const HistoryCommand& command);
 
+/// `nullmark merge`.
+struct MergeCommand {
+  std::vector<std::string> parts;
+  std::string output, builds;
+  bool force = false;
+};
+ExitCode merge_command(const MergeCommand& command);
+
 /// `nullmark list`.
 struct ListCommand {
   std::string what;  ///< "estimators", "media", "majorants", "rays" or "quantities"

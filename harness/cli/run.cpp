@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <random>
 #include <regex>
 #include <set>
@@ -31,6 +32,7 @@
 #include "harness/report/results_tables.h"
 #include "harness/report/warnings.h"
 #include "harness/run/covering.h"
+#include "harness/run/deal.h"
 #include "harness/run/journal.h"
 #include "harness/run/predict.h"
 #include "harness/run/progress.h"
@@ -71,13 +73,6 @@ std::vector<bool> filtered(const Plan& plan, const RunCommand& command) {
   return wanted;
 }
 
-/// Those of the wanted cells that are of the shard.
-std::vector<bool> of_shard(const std::vector<bool>& wanted, const Shard& shard) {
-  std::vector<bool> selected = wanted;
-  for (std::size_t i = 0; i < selected.size(); ++i) selected[i] = wanted[i] && i % shard.count == shard.index;
-  return selected;
-}
-
 /// Tasks of a scheduler run in one folder, so a shard's results are named after it: "c.2-of-4.results.json".
 std::string default_output(const std::string& config, const Shard& shard) {
   std::filesystem::path path(config == "-" ? "stdin" : config);
@@ -90,7 +85,7 @@ std::string default_output(const std::string& config, const Shard& shard) {
 std::string percent(double fraction) { return fmt::format("{:.2g} %", 100 * fraction); }
 
 /// What each cell would cost and how small a bias its samples would show.
-ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected, bool timing) {
+ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected, bool timing, const Shard& shard, const Deal& dealt) {
   // A pooled bias of five standard errors is hardly chance, whatever the number of cells.
   constexpr double kStandardErrors = 5;
   const Forecast run = forecast(plan, selected);
@@ -115,6 +110,11 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected, bool timin
   if (run.cells.size() < run.selected) tell("{} of the cells stand for all; ", run.cells.size());
   tell("{} cells: about {:.3g} samples before those that verdicts add, {:.3g} s of CPU{}\n", run.selected, samples * run.weight(),
        seconds * run.weight(), timing && plan.timing.enabled ? fmt::format(" and {:.3g} s of timing", run.timing_seconds) : "");
+  if (shard.count > 1) {
+    const double mean = std::accumulate(dealt.loads.begin(), dealt.loads.end(), 0.) / static_cast<double>(shard.count);
+    tell("shard {}: {:.3f} of the mean load, the largest has {:.3f}; {} cells are split\n", shard.text(),
+         dealt.loads[shard.index] / mean, *std::max_element(dealt.loads.begin(), dealt.loads.end()) / mean, dealt.split_cells());
+  }
   if (any) return ExitCode::ok;
   notice("nullmark: nothing would run: all cells are skipped\n");
   return ExitCode::nothing_ran;
@@ -144,7 +144,7 @@ ExitCode outcome(const std::vector<CellRecord>& cells) {
   bool any_ok = false;
   for (const CellRecord& cell : cells) {
     if (cell.status == Status::error) return ExitCode::internal_error;
-    any_ok |= cell.status == Status::ok;
+    any_ok |= cell.status == Status::ok || !cell.drawn_parts.empty();
   }
   if (any_ok) return ExitCode::ok;
   notice("nullmark: nothing ran: all cells were skipped or not started\n");
@@ -225,7 +225,7 @@ RunOptions options_of(const RunCommand& command, const std::string& output) {
 RunObserver observer_of(Journal* journal, Progress& progress, RunContext& context) {
   RunObserver observer;
   observer.cell_done = [&progress, journal](const SharedRecord& record, std::size_t done, std::size_t total) {
-    if (journal && (record->status == Status::ok || record->status == Status::error)) journal->append(*record);
+    if (journal && has_samples(*record)) journal->append(*record);
     progress.cell_done(*record, done, total);
   };
   observer.progress = [&progress](const CellRecord& record, double fraction) { progress.cell_progress(record, fraction); };
@@ -276,7 +276,9 @@ ExitCode run_command(const RunCommand& command) {
   const std::optional<std::uint64_t> seed = requested_seed(command.seed);
   const Plan plan = read_configs(sources, seed);
   const Shard shard = requested_shard(command.shard);
-  const std::vector<bool> wanted = filtered(plan, command), selected = of_shard(wanted, shard);
+  const std::vector<bool> wanted = filtered(plan, command);
+  const Deal dealt = shard.count > 1 ? deal(plan, wanted, shard.count) : Deal();
+  const std::vector<bool> selected = shard.count > 1 ? dealt.cells_of(shard.index) : wanted;
   const auto count = static_cast<std::size_t>(std::count(selected.begin(), selected.end(), true));
   if (count == 0) {
     notice("nullmark: nothing selected: none of {} cells passes --filter, --covering and --shard\n", plan.cells.size());
@@ -285,7 +287,7 @@ ExitCode run_command(const RunCommand& command) {
   if (seed) warn_of_own_seeds(plan, *seed);
   warn_of_narrow_phases(plan, selected);
   expect_threads(command.threads);
-  if (command.dry_run) return dry_run(plan, selected, !command.no_timing);
+  if (command.dry_run) return dry_run(plan, selected, !command.no_timing, shard, dealt);
 
   const bool to_stdout = command.output == "-";
   const std::string output = command.output.empty() ? default_output(command.configs.front(), shard) : command.output;
@@ -296,14 +298,16 @@ ExitCode run_command(const RunCommand& command) {
     if (command.resume) earlier = earlier_results(plan, output, *journal, builds_of(command.builds));
   }
   RunContext context = context_of(command, plan, shard);
-  const RunOptions options = options_of(command, to_stdout ? "" : output);
+  RunOptions options = options_of(command, to_stdout ? "" : output);
+  if (shard.count > 1) options.shares = dealt.shares_of(shard.index);
 
   // What was there before was selected then.
   for (std::size_t i = 0; i < plan.cells.size(); ++i) context.selected += wanted[i] || earlier.contains(i);
 
   std::vector<CellRecord> finished;
   for (const auto& [place, record] : earlier)
-    if (selected[place] && record.status == Status::ok) finished.push_back(placed(record, plan.cells[place]));
+    if (selected[place] && is_kept(record, options.shares.empty() ? CellShare() : options.shares[place]))
+      finished.push_back(placed(record, plan.cells[place]));
 
   catch_signals();
   std::optional<Progress> progress(count - finished.size());

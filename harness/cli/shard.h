@@ -5,7 +5,7 @@
 
 namespace nullmark {
 
-/// Part `index` of `count` of a configuration's cells, index from 0.
+/// Part `index` of `count` of a configuration's work, index from 0.
 struct Shard {
   std::size_t index = 0, count = 1;
 

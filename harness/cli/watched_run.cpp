@@ -34,7 +34,7 @@ class FinishedCells {
     keeps.cell_done = [this, &observer](const SharedRecord& record, std::size_t done, std::size_t total) {
       const std::lock_guard lock(mutex_);
       observer.cell_done(record, done, total);
-      if (record->status != Status::not_run) cells_[record->cell.name] = record;
+      if (record->status != Status::not_run || has_samples(*record)) cells_[record->cell.name] = record;
     };
     keeps.cell_timed = [this, &observer](const SharedRecord& record) {
       const std::lock_guard lock(mutex_);

@@ -168,6 +168,10 @@ struct CellRecord {
   /// Mean squared errors of disjoint parts of the samples (BlockErrors), averaged over channels.  Estimators with the same
   /// streams have the same parts.  Empty if there are too few samples, and for quantities with several numbers per channel.
   std::vector<Real> squared_error_blocks;
+  /// Of a cell that shards share and that is not judged yet: which part of its samples is drawn, "2/4", or empty where parts are
+  /// joined; and what was drawn, as text (harness/run/cell_draws.h).
+  std::string part;
+  std::vector<std::string> drawn_parts;
   std::map<std::string, std::string> images;  ///< "mean", "variance", "lookups" -> path relative to the results file
 };
 

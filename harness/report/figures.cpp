@@ -12,8 +12,8 @@
 
 #include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
+#include "harness/io/packing.h"
 #include "harness/io/text.h"
-#include "harness/report/packing.h"
 
 namespace nullmark {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "harness/report/packing.h"
+#include "harness/io/packing.h"
 #include "harness/run/image.h"
 
 namespace nullmark {

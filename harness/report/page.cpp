@@ -3,7 +3,7 @@
 #include <map>
 #include <string_view>
 
-#include "harness/report/packing.h"
+#include "harness/io/packing.h"
 
 // The parts of the page, as they lie in the source and the build folder.
 #define NULLMARK_ASSET(name, path)                              \

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "harness/io/packing.h"
 #include "harness/report/data.h"
-#include "harness/report/packing.h"
 #include "harness/report/page.h"
 #include "harness/run/image.h"
 #include "harness/testing/page_data.h"

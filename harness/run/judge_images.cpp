@@ -123,14 +123,23 @@ class PictureJudging {
     // As of a group of rays: as many standard errors as in the test of them all.
     const Real mean = prepared.targets.mean[0];
     if (group > 0 && mean > 0) cell.verdict.epsilon = std::sqrt(static_cast<Real>(kRayGroups)) * margins_[channel] / mean;
-    std::vector<KeptSamples> kept;
-    const auto tests = tests_of(prepared, TestLevels{plan_.error_rates.alpha_pass, families_.means}, kept, stop_);
+    const DrawnPilot pilot = draw_pilot(prepared, stop_);
+    const auto tests = tests_of(prepared, TestLevels{plan_.error_rates.alpha_pass, families_.means}, pilot);
     const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
                                      {.per_ray = prepared.samples_per_ray}, tests ? &*tests : nullptr, stop_, [](double) {});
     if (!sampled) return false;
     Effort effort;
     std::optional<VerdictRecord> verdict;
-    if (tests) verdict = judge(prepared, *tests, *sampled, kept, plan_.error_rates, families_, effort, stop_, [](double) {});
+    std::vector<KeptSamples> kept;
+    if (pilot.kept) kept.push_back(*pilot.kept);
+    const auto draw = [&](const SampleSpan& span) {
+      return sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, span, &*tests, stop_,
+                         [](double) {});
+    };
+    if (tests)
+      verdict = judge(prepared, *tests, *sampled, kept,
+                      draw_walk_laws(prepared, *tests, sampled->lookups_of_a_sample(), plan_.error_rates.alpha_pass, stop_),
+                      plan_.error_rates, families_, effort, draw, stop_);
     if (stop_()) return false;
     if (group == 0) {
       if (tests && !tests->tests.empty()) margins_[channel] = tests->tests.front().epsilon;

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include "harness/config/config.h"
 #include "harness/io/results_json.h"
 #include "harness/io/spec_json.h"
+#include "harness/run/cell_draws.h"
 
 namespace nullmark {
 namespace {
@@ -24,7 +27,11 @@ std::string statistics_of(const CellRecord& record) {
 /// Of two records of a cell the one that tells more.
 const CellRecord* better(const CellRecord* a, const CellRecord* b) {
   const auto rank = [](const CellRecord& record) {
-    return (record.status == Status::ok ? 2 : record.status == Status::error ? 1 : 0) * 2 + (record.time ? 1 : 0);
+    const int told = record.status == Status::ok        ? 3
+                     : record.status == Status::error   ? 2
+                     : record.status == Status::skipped ? 1
+                                                        : 0;
+    return told * 2 + (record.time ? 1 : 0);
   };
   return rank(*b) > rank(*a) ? b : a;
 }
@@ -41,6 +48,7 @@ std::array<std::string, 3> selection(const RunRecord& run) {
 struct Found {
   const CellRecord* record;
   std::size_t part;
+  std::vector<std::pair<const CellRecord*, std::size_t>> shares{};  ///< records of parts of a split cell
 };
 
 /// Cells of all parts by name, each the one that tells most.
@@ -52,12 +60,15 @@ std::map<std::string, Found> found_cells(const std::vector<RunRecord>& parts, co
                                    config_hash(parts[part].config_text), names[0], config_hash(parts[0].config_text)));
     for (const CellRecord& record : parts[part].cells) {
       const auto [at, added] = cells.emplace(record.cell.name, Found{&record, part});
+      if (!record.drawn_parts.empty()) at->second.shares.emplace_back(&record, part);
       if (added) continue;
       const CellRecord& other = *at->second.record;
       if (sampled(record) && sampled(other) && statistics_of(record) != statistics_of(other))
         throw InputError(fmt::format("{}: cell \"{}\" has other statistics than in {}; expected the same to the last bit",
                                      names[part], record.cell.name, names[at->second.part]));
-      if (const CellRecord* best = better(at->second.record, &record); best == &record) at->second = {best, part};
+      if (better(at->second.record, &record) != &record) continue;
+      at->second.record = &record;
+      at->second.part = part;
     }
   }
   return cells;
@@ -83,6 +94,33 @@ class MediaSeen {
   const std::vector<std::string>& names_;
   std::map<std::size_t, std::pair<std::string, std::size_t>> seen_;
 };
+
+/// One record of the parts of a split cell that are there.  Throws InputError where they are damaged or do not fit.
+CellRecord joined(const Found& cell, const std::vector<std::string>& names, const std::vector<Build>& made_by) {
+  CellRecord whole = *cell.shares.front().first;
+  whole.part.clear();
+  whole.drawn_parts.clear();
+  std::optional<CellDraws> all;
+  for (const auto& [record, part] : cell.shares) {
+    const std::string where = fmt::format("{}: cell \"{}\"", names[part], record->cell.name);
+    expect_joinable(names[part], made_by[part], "this program, which joins parts of cells", this_build(), Builds::same);
+    if (!record->build.empty()) throw InputError(where + ": found a part that another build drew; run the shard again");
+    if (record->cell.id != whole.cell.id) throw InputError(where + ": found a part of another cell; run the shard again");
+    for (const std::string& text : record->drawn_parts) {
+      if (std::find(whole.drawn_parts.begin(), whole.drawn_parts.end(), text) != whole.drawn_parts.end()) continue;
+      CellDraws draws = read_draws(text, where);
+      if (draws.cell != whole.cell.id) throw InputError(where + ": found samples of another cell; run the shard again");
+      if (all)
+        join(*all, std::move(draws), where);
+      else
+        all = std::move(draws);
+      whole.drawn_parts.push_back(text);
+    }
+    if (record->time) whole.time = record->time;
+  }
+  whole.reason = "parts of the cell are drawn; `run --resume` draws the others";
+  return whole;
+}
 
 }  // namespace
 
@@ -118,9 +156,12 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
   }
   for (const Cell& cell : read_config(parts[0].config_text, names[0] + "#config").cells)
     if (const auto at = cells.find(cell.name); at != cells.end()) {
-      media.add(cell.medium, *at->second.record, at->second.part);
-      merged.cells.push_back(*at->second.record);
-      mark_build(merged.cells.back(), made_by[at->second.part], made_by[0]);
+      const Found& found = at->second;
+      for (const auto& [record, part] : found.shares) media.add(cell.medium, *record, part);
+      media.add(cell.medium, *found.record, found.part);
+      merged.cells.push_back(found.record->status == Status::not_run && !found.shares.empty() ? joined(found, names, made_by)
+                                                                                              : *found.record);
+      mark_build(merged.cells.back(), made_by[found.part], made_by[0]);
       cells.erase(at);
     }
   if (!cells.empty())

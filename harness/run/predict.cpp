@@ -5,9 +5,9 @@
 
 #include "harness/registry/components.h"
 #include "harness/run/cpu_clock.h"
+#include "harness/run/demand.h"
 #include "harness/sampling/test_families.h"
 #include "harness/verdict/judge.h"
-#include "harness/verdict/walk_laws.h"
 
 namespace nullmark {
 namespace {
@@ -26,28 +26,6 @@ std::vector<std::size_t> chosen_cells(const Plan& plan, const std::vector<bool>&
   for (std::size_t k = 0; k < kMostCells; ++k) some.push_back(all[(2 * k + 1) * all.size() / (2 * kMostCells)]);
   std::sort(some.begin(), some.end());
   return some;
-}
-
-/// The cell with as many samples in total, on the rays that stand for all.
-Cell concentrated(const PreparedCell& prepared, double rays_for_each) {
-  Cell cell = prepared.planned();
-  const auto more = [&](std::uint64_t samples) {
-    return static_cast<std::uint64_t>(std::min(9e15, static_cast<double>(samples) * rays_for_each));
-  };
-  cell.samples_per_ray = more(cell.samples_per_ray);
-  cell.verdict.max_samples_per_ray = more(cell.verdict.max_samples_per_ray);
-  if (cell.verdict.max_lookups_per_ray) *cell.verdict.max_lookups_per_ray *= rays_for_each;
-  return cell;
-}
-
-/// Samples per ray that a cell draws.
-std::uint64_t drawn(const PreparedCell& prepared, const TestPlan* plan) {
-  const std::uint64_t first = prepared.samples_per_ray;
-  if (!plan) return first;
-  std::uint64_t samples = std::max(first, plan->planned <= plan->affordable ? plan->planned : 0);
-  if (!plan->lookups.empty() && plan->tests.back().planned <= std::min(plan->affordable, std::max(first, plan->planned)))
-    samples = std::max(samples, plan->tests.back().planned);
-  return samples;
 }
 
 /// CPU seconds of a span of samples and of one more sample of each ray, measured by spans of two lengths.
@@ -75,39 +53,9 @@ SpanCost span_cost(const PreparedCell& prepared, const TestPlan* plan, std::uint
   return {std::max(0., took - each * static_cast<double>(count)), each};
 }
 
-/// Samples of each ray that cost as much as the laws of walks, which record what they draw.
-double samples_of_laws(const PreparedCell& prepared, const TestPlan& plan) {
-  constexpr double kRecording = 3;
-  const LawPolicy policy = prepared.cell->verdict.laws;
-  if (policy == LawPolicy::never || (policy == LawPolicy::undecided && plan.undecidable.empty()) || plan.against != "reference")
-    return 0;
-  const auto rays = static_cast<double>(prepared.scene->rays->world.size());
-  const double affordable = LawBudget{}.lookups / std::max(1., prepared.theory.lookups.value_or(1)) / rays;
-  return kRecording * std::min(affordable, static_cast<double>(LawBudget{}.most_per_ray));
-}
-
-/// The tests of a cell whose variance theory does not state, from a pilot smaller than the run's.
-std::optional<TestPlan> tests_by_pilot(const PreparedCell& prepared, const TestLevels& levels) {
-  constexpr std::uint64_t kSamples = 8192, kLeast = 16;
-  PreparedCell small = prepared;
-  const std::uint64_t rays = std::max<std::uint64_t>(1, prepared.scene->rays->world.size());
-  small.samples_per_ray = std::min(prepared.samples_per_ray, std::max(kLeast, kSamples / rays));
-  std::vector<KeptSamples> kept;
-  return tests_of(small, levels, kept, [] { return false; });
-}
-
 void predict(const PreparedCell& prepared, const TestLevels& levels, double rays_for_each, Prediction& prediction) {
-  PreparedCell whole = prepared;
-  const Cell cell = concentrated(prepared, rays_for_each);
-  whole.cell = &cell;
-  whole.samples_per_ray = cell.samples_per_ray;
-  const bool pilot = prepared.theory.ray_variance.empty() && prepared.claim != Guarantee::exact;
-  std::optional<TestPlan> plan;
-  if (why_not_judged(prepared).empty() && !tests_nothing(prepared))
-    plan = pilot ? tests_by_pilot(whole, levels)
-                 : plan_tests(cell, *prepared.scene, prepared.targets, prepared.range, prepared.claim, prepared.theory,
-                              std::nullopt, levels);
-  const TestPlan* const tests = plan ? &*plan : nullptr;
+  const Demand demand(prepared, levels, rays_for_each);
+  const TestPlan* const tests = demand.tests ? &*demand.tests : nullptr;
   if (!tests)
     prediction.verdict = "not judged";
   else if (prepared.needs_bound && !prepared.scene->bounding)
@@ -115,10 +63,8 @@ void predict(const PreparedCell& prepared, const TestLevels& levels, double rays
   else
     prediction.verdict = tests->undecidable.empty() ? "PASS" : "INCONCLUSIVE";
   if (tests) prediction.planned = static_cast<std::uint64_t>(std::ceil(static_cast<double>(tests->planned) / rays_for_each));
-  auto samples = static_cast<double>(drawn(whole, tests));
-  if (pilot && tests) samples += static_cast<double>(whole.samples_per_ray);
-  if (tests) samples += samples_of_laws(whole, *tests);
-  const SpanCost cost = span_cost(whole, tests, whole.samples_per_ray);
+  const double samples = demand.samples + demand.pilot + demand.laws;
+  const SpanCost cost = span_cost(demand.whole, tests, demand.whole.samples_per_ray);
   prediction.seconds = cost.span + cost.each * samples;
 }
 

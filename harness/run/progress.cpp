@@ -53,8 +53,11 @@ void Progress::cell_done(const CellRecord& record, std::size_t done, std::size_t
   }
   if (!lines_) return;
   last_told_ = Clock::now();
-  notice("[{}/{}] {}: {}{}\n", done, total, record.cell.name, to_string(record.status),
-         record.reason.empty() ? "" : " (" + record.reason + ")");
+  if (!record.part.empty())
+    notice("[{}/{}] {}: part {} drawn\n", done, total, record.cell.name, record.part);
+  else
+    notice("[{}/{}] {}: {}{}\n", done, total, record.cell.name, to_string(record.status),
+           record.reason.empty() ? "" : " (" + record.reason + ")");
 }
 
 void Progress::timing(double fraction) {

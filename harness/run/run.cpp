@@ -19,107 +19,23 @@
 #include <thread>
 
 #include "harness/io/json_input.h"
-#include "harness/model/in_flight.h"
-#include "harness/run/cell_images.h"
 #include "harness/run/cell_record.h"
 #include "harness/run/cpu_clock.h"
+#include "harness/run/run_cell.h"
 #include "harness/run/task_thread.h"
-#include "harness/sampling/failure.h"
 #include "harness/sampling/test_families.h"
 #include "harness/sampling/timing.h"
 #include "harness/verdict/judge.h"
-#include "harness/verdict/reliance.h"
 
 namespace nullmark {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct CellOutcome {
-  std::shared_ptr<CellRecord> record;
-  Effort effort;
-};
+using Records = std::map<std::size_t, std::shared_ptr<CellRecord>>;  // by place in the plan
 
-bool moments_are_finite(const CellRecord& record) {
-  return std::all_of(record.channel.begin(), record.channel.end(), [&](const ChannelRecord& channel) {
-    return channel.mean && (channel.variance || record.cell.samples_per_ray == 1);
-  });
-}
-
-/// Samples and judges a cell.
-CellOutcome run_cell(const Plan& plan, PreparedCell& prepared, const Families& families, const std::function<bool()>& late,
-                     const RunOptions& options, const RunObserver& observer, const std::function<bool()>& given_up) {
-  CellOutcome outcome{std::make_shared<CellRecord>(blank_record(plan, prepared)), {}};
-  CellRecord& record = *outcome.record;
-  if (!prepared.reason.empty()) {
-    record.status = prepared.failure.empty() ? Status::skipped : Status::error;
-    record.reason = prepared.reason;
-    return outcome;
-  }
-  const auto stop = [&] { return given_up() || late(); };
-  const auto why = [&] { return given_up() ? kInterrupted : kBudgetSpent; };
-  if (stop()) {
-    record.reason = why();
-    return outcome;
-  }
-  const auto progress = [&](double fraction) { observer.progress(record, fraction); };
-  std::vector<KeptSamples> kept;
-  const std::optional<TestPlan> test_plan =
-      tests_of(prepared, TestLevels{plan.error_rates.alpha_pass, families.means}, kept, stop);
-  const auto sampled = sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                                   {.per_ray = prepared.samples_per_ray, .keep = test_plan.has_value()},
-                                   test_plan ? &*test_plan : nullptr, stop, progress);
-  if (sampled) outcome.effort += *sampled;
-  if (sampled && sampled->counters.overruns == 0) kept.push_back(sampled->kept);
-  std::optional<VerdictRecord> verdict;
-  if (sampled && test_plan)
-    verdict = judge(prepared, *test_plan, *sampled, kept, plan.error_rates, families, outcome.effort, stop, progress);
-  const bool judged = sampled && (!test_plan || verdict);
-  std::optional<Real> reliance;
-  if (judged && outcome.effort.overruns == 0)
-    reliance = measure_reliance(prepared.planned(), *prepared.scene, *prepared.kernel, stop);
-  // Laws, replays and reliance that are cut off would be missing without a word, as if they did not apply.
-  if (!judged || stop()) {
-    record.reason = why();
-    return outcome;
-  }
-  fill_statistics(record, prepared, *sampled);
-  if (record.status == Status::ok && !moments_are_finite(record)) {
-    record.status = Status::error;
-    record.reason = "its samples are finite, but their mean or variance is beyond the largest number, 1.8e308: scale the scene";
-  }
-  if (record.status == Status::ok && verdict && verdict->nonfinite > 0) {
-    record.status = Status::error;
-    record.nonfinite += verdict->nonfinite;
-    record.reason =
-        fmt::format("{} samples are not finite, among those drawn for the verdict; `replay` shows the first", verdict->nonfinite);
-  }
-  if (record.status == Status::ok && outcome.effort.overruns > 0) {
-    record.status = Status::error;
-    record.reason = fmt::format("{} walks took more than {} lookups", outcome.effort.overruns, Workspace().most_lookups);
-  }
-  if (record.status == Status::ok) {
-    add_verdict(record, prepared, verdict);
-    record.reliance = reliance;
-  } else {
-    drop_sampled_statistics(record);
-  }
-  write_images(record, prepared, *sampled, options, observer);
-  return outcome;
-}
-
-/// The same; what a tracker throws makes an error of its cell alone.
-CellOutcome run_or_fail(const Plan& plan, PreparedCell& prepared, const Families& families, const std::function<bool()>& late,
-                        const RunOptions& options, const RunObserver& observer, const std::function<bool()>& given_up) {
-  const InFlight named(prepared.cell->name);
-  CellOutcome outcome;
-  const std::string failure = failure_of<InputError, ParameterError, std::bad_alloc>(
-      [&] { outcome = run_cell(plan, prepared, families, late, options, observer, given_up); });
-  if (failure.empty()) return outcome;
-  outcome = {std::make_shared<CellRecord>(blank_record(plan, prepared)), {}};
-  outcome.record->status = Status::error;
-  outcome.record->reason = failure;
-  return outcome;
+CellShare share_of(const RunOptions& options, std::size_t cell) {
+  return options.shares.empty() ? CellShare() : options.shares[cell];
 }
 
 /// Calls `work` for 0 .. count - 1, begun in this order, one on each thread; threads that find none left help with the chunks of
@@ -144,8 +60,8 @@ void for_each_in_order(std::size_t count, int threads, std::atomic<bool>& failed
 }
 
 /// Samples and judges cells on all threads, and tells of each when it is done.
-std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& cells, int threads, const RunOptions& options,
-                                   const RunObserver& observer, const std::function<bool()>& late,
+std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& cells, const Records& drawn, int threads,
+                                   const RunOptions& options, const RunObserver& observer, const std::function<bool()>& late,
                                    const std::function<bool()>& stop) {
   const Families families{mean_family(plan), lookups_family(plan), laws_family(plan)};
   std::vector<CellOutcome> outcomes(cells.size());
@@ -167,7 +83,10 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
     if (const std::unique_lock lock(telling, std::try_to_lock); lock) observer.progress(record, fraction);
   };
   for_each_in_order(cells.size(), threads, failed, [&](std::size_t i) {
-    outcomes[i] = run_or_fail(plan, cells[i], families, late, options, guarded, given_up);
+    const auto before = drawn.find(cells[i].index);
+    const CellTask task{cells[i], share_of(options, cells[i].index), before == drawn.end() ? nullptr : before->second.get(),
+                        options.may_draw};
+    outcomes[i] = run_cell(plan, task, families, late, options, guarded, given_up);
     // Many cells at once should hold no more than their records.
     cells[i].targets = {};
     cells[i].theory = {};
@@ -178,6 +97,11 @@ std::vector<CellOutcome> run_cells(const Plan& plan, std::vector<PreparedCell>& 
   });
   teller.finish();
   return outcomes;
+}
+
+/// Whether a cell is timed here: one that was sampled; of a split one, with its first part.
+bool is_timed(const CellRecord& record, const CellShare& share) {
+  return record.status == Status::ok || (!record.drawn_parts.empty() && share.parts > 1 && share.part == 0);
 }
 
 /// Tells what each phase took, one after another.
@@ -198,8 +122,6 @@ class PhaseClock {
   Clock::time_point wall_ = Clock::now();
   double cpu_ = cpu_seconds();
 };
-
-using Records = std::map<std::size_t, std::shared_ptr<CellRecord>>;  // by place in the plan
 
 void time_records(const std::vector<const PreparedCell*>& cells, const TimingPlan& plan, Records& records,
                   const RunObserver& observer, const std::function<bool()>& stop) {
@@ -249,6 +171,17 @@ void expect_same_trackers(CellPreparer& preparer, const Records& finished) {
 
 }  // namespace
 
+std::string CellShare::text() const { return fmt::format("{}/{}", part + 1, parts); }
+
+bool has_samples(const CellRecord& record) {
+  return record.status == Status::ok || record.status == Status::error || !record.drawn_parts.empty();
+}
+
+bool is_kept(const CellRecord& record, const CellShare& share) {
+  if (record.drawn_parts.empty()) return record.status == Status::ok;
+  return record.build.empty() && (share.parts == 1 || record.part == share.text());
+}
+
 std::vector<CellRecord> cut_off(const Plan& plan, const std::vector<bool>& selected,
                                 const std::map<std::string, SharedRecord>& finished, const std::string& reason) {
   std::vector<CellRecord> records;
@@ -289,17 +222,27 @@ std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::v
   };
   const std::function<bool()> ended = [&] { return stop() || late(); };
 
-  Records records;
-  std::map<std::string_view, const CellRecord*> by_id;
-  for (const CellRecord& record : finished) by_id[record.cell.id] = &record;
-  for (std::size_t i = 0; i < plan.cells.size(); ++i)
-    if (const auto at = by_id.find(plan.cells[i].id); selected[i] && at != by_id.end())
+  Records records, drawn;
+  std::map<std::string_view, const CellRecord*> by_id, parts_by_name;
+  for (const CellRecord& record : finished) {
+    if (record.drawn_parts.empty())
+      by_id[record.cell.id] = &record;
+    else
+      parts_by_name[record.cell.name] = &record;
+  }
+  for (std::size_t i = 0; i < plan.cells.size(); ++i) {
+    if (!selected[i]) continue;
+    if (const auto at = by_id.find(plan.cells[i].id); at != by_id.end())
       records[i] = std::make_shared<CellRecord>(*at->second);
+    else if (const auto parts = parts_by_name.find(plan.cells[i].name); parts != parts_by_name.end())
+      (share_of(options, i).parts > 1 ? records : drawn)[i] = std::make_shared<CellRecord>(*parts->second);
+  }
 
   PhaseClock clock(observer);
   const bool timing = options.timing && plan.timing.enabled;
   CellPreparer preparer(plan);
   expect_same_media(preparer, plan, records);
+  expect_same_media(preparer, plan, drawn);
   expect_same_trackers(preparer, records);
   std::vector<PreparedCell> cells = prepare_all(
       preparer, plan, [&](std::size_t i) { return selected[i] && !records.contains(i); }, ended);
@@ -308,14 +251,17 @@ std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::v
       preparer, plan,
       [&](std::size_t i) {
         const auto record = records.find(i);
-        return timing && record != records.end() && record->second->status == Status::ok && !record->second->time &&
+        return timing && record != records.end() && is_timed(*record->second, share_of(options, i)) && !record->second->time &&
                record->second->build.empty() && !plan.cells[i].minus;
       },
       ended);
   clock.end("preparation");
+  for (PreparedCell& prepared : cells)
+    prepared.theory_later = drawn.contains(prepared.index) ||
+                            (prepared.kernel && share_of(options, prepared.index).part > 0 && !needs_theory(prepared));
   add_theory(cells, ended);
   clock.end("theory");
-  std::vector<CellOutcome> outcomes = run_cells(plan, cells, threads, options, observer, late, stop);
+  std::vector<CellOutcome> outcomes = run_cells(plan, cells, drawn, threads, options, observer, late, stop);
   clock.end("sampling");
 
   std::vector<const PreparedCell*> to_time;
@@ -325,7 +271,7 @@ std::vector<std::shared_ptr<CellRecord>> run_plan(const Plan& plan, const std::v
   Effort effort;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     effort += outcomes[i].effort;
-    if (outcomes[i].record->status == Status::ok && !cells[i].subtracted) to_time.push_back(&cells[i]);
+    if (is_timed(*outcomes[i].record, share_of(options, cells[i].index)) && !cells[i].subtracted) to_time.push_back(&cells[i]);
     records[cells[i].index] = std::move(outcomes[i].record);
   }
   if (timing && !to_time.empty() && !ended()) {

@@ -265,6 +265,11 @@ PreparedCell unprepared(const Plan& plan, std::size_t index) {
   return prepared;
 }
 
+bool is_from_outside(const Cell& cell) {
+  const auto outside = [](const Component& tracker) { return Registry<EstimatorEntry>::instance().find(tracker.type)->foreign; };
+  return outside(*cell.estimator) || (cell.minus && outside(**cell.minus));
+}
+
 std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted,
                                       const std::function<bool()>& stop) {
   expect_rays_fit(plan, wanted);
@@ -313,13 +318,19 @@ void refuse_endless(PreparedCell& prepared) {
         prepared.theory.majorant_depth);
 }
 
+/// What follows from the theory of a cell.
+void follow_theory(PreparedCell& prepared) {
+  if (prepared.cell->equal_lookups) equalise(prepared, *prepared.cell->equal_lookups);
+  if (prepared.reason.empty()) refuse_endless(prepared);
+}
+
 }  // namespace
 
 void add_theory(std::vector<PreparedCell>& cells, const std::function<bool()>& stop) {
   std::map<const Scene*, std::vector<PreparedCell*>> by_scene;
   for (PreparedCell& prepared : cells) {
     const bool plain = prepared.cell->measurement == Measurement{};
-    if (prepared.scene && prepared.reason.empty() && plain && prepared.kernel->states_theory())
+    if (prepared.scene && prepared.reason.empty() && plain && !prepared.theory_later && prepared.kernel->states_theory())
       by_scene[prepared.scene.get()].push_back(&prepared);
   }
   std::vector<std::span<PreparedCell* const>> batches;
@@ -342,11 +353,13 @@ void add_theory(std::vector<PreparedCell>& cells, const std::function<bool()>& s
           tracker_failure([&] { members[i]->theory = compute_theory(scene, {queries[i]})[0]; });
   });
   if (stop()) return;
-  for (PreparedCell& prepared : cells) {
-    if (!prepared.reason.empty()) continue;
-    if (prepared.cell->equal_lookups) equalise(prepared, *prepared.cell->equal_lookups);
-    if (prepared.reason.empty()) refuse_endless(prepared);
-  }
+  for (PreparedCell& prepared : cells)
+    if (prepared.reason.empty() && !prepared.theory_later) follow_theory(prepared);
+}
+
+void take_theory(PreparedCell& prepared, CellTheory theory) {
+  prepared.theory = std::move(theory);
+  follow_theory(prepared);
 }
 
 }  // namespace nullmark

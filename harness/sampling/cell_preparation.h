@@ -25,6 +25,7 @@ struct PreparedCell {
   bool takes_part = true;            ///< false: flights are closed forms, and the estimator is not used
   Targets targets;
   CellTheory theory;
+  bool theory_later = false;  ///< `add_theory` leaves the cell to `take_theory`
   std::uint64_t samples_per_ray = 0;
   Guarantee claim = Guarantee::unbiased;
   SampleRange range = SampleRange::any_sign;
@@ -74,6 +75,9 @@ class CellPreparer {
   std::map<const Scene*, Real> deepest_;  ///< largest majorant depth of a ray, if it was needed
 };
 
+/// Whether a tracker of the cell is from outside of nullmark.
+bool is_from_outside(const Cell& cell);
+
 /// A cell of which nothing is built yet.
 PreparedCell unprepared(const Plan& plan, std::size_t index);
 
@@ -89,5 +93,8 @@ std::vector<PreparedCell> prepare_all(
 /// Once `stop` returns true, the theory of scenes that are left is not computed.
 void add_theory(
     std::vector<PreparedCell>& cells, const std::function<bool()>& stop = [] { return false; });
+
+/// Adds a theory that was computed before to a cell that can run; the same holds as for `add_theory`.
+void take_theory(PreparedCell& prepared, CellTheory theory);
 
 }  // namespace nullmark

@@ -44,4 +44,8 @@ KeptSamples::Sample KeptSamples::at(std::size_t i) const {
   return {ray((i - opening_) / each_), number((i - opening_) % each_), values};
 }
 
+void KeptSamples::set(std::size_t i, std::span<const Real> values) {
+  std::copy_n(values.begin(), outputs_, &values_[i * outputs_]);
+}
+
 }  // namespace nullmark

@@ -29,6 +29,8 @@ class KeptSamples {
   std::size_t count() const { return opening_ + rays_ * each_; }
   /// By ray, then by sample; the first 16 of ray 0 come first.
   Sample at(std::size_t i) const;
+  /// Gives the i-th sample its values.
+  void set(std::size_t i, std::span<const Real> values);
 
  private:
   std::uint64_t number(std::uint64_t j) const { return each_ > 1 ? first_ + j * (per_ray_ - 1) / (each_ - 1) : first_; }

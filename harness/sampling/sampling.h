@@ -1,9 +1,9 @@
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <vector>
 
+#include "harness/sampling/draw_portions.h"
 #include "harness/sampling/kept_samples.h"
 #include "harness/sampling/scene.h"
 #include "harness/sampling/targets.h"
@@ -29,20 +29,19 @@ struct Sampled {
   KeptSamples kept;                 ///< if the span asks for them
   /// Time of all threads: for evidence; for all statistics of drawn samples; in total.
   double judging_seconds = 0, statistics_seconds = 0, working_seconds = 0;
-};
 
-/// A range of a cell's samples: first .. first + per_ray - 1 of every ray.
-struct SampleSpan {
-  std::uint64_t first = 0, per_ray = 0;
-  bool only_evidence = false;  ///< leave moments, groups, blocks and squares of lookups empty
-  bool keep = false;           ///< keep some values, to draw them again later
+  Real lookups_of_a_sample() const {
+    return static_cast<Real>(counters.lookups) / static_cast<Real>(std::max<std::uint64_t>(1, counters.samples));
+  }
 };
 
 /// Clamps, then quantises, as configured.
 Real measured(Real value, const Measurement& measurement);
 
-/// Draws every sample of the cell with TBB's threads.  Chunks depend only on the plan and are merged in order.  `stop` is called
-/// between chunks; once it returns true, the result is empty.  If there is a plan, evidence is gathered for its tests.
+/// Folds all portions of a span in their order.
+Sampled fold(const Portions& portions, std::size_t rays, std::size_t outputs, const SampleSpan& span, const TestPlan* plan);
+
+/// Draws every sample of the span and folds it: the same bits for any number of threads.
 std::optional<Sampled> sample_cell(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
                                    SampleSpan span, const TestPlan* plan, const std::function<bool()>& stop,
                                    const std::function<void(double)>& progress);

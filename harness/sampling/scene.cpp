@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <numeric>
+#include <set>
 
 #include "harness/model/hash.h"
 #include "harness/registry/components.h"
@@ -168,10 +169,17 @@ BuiltRays build_rays(const Component& spec, const BuiltMedium& medium) {
 BuiltRays thinned(BuiltRays rays, std::size_t most) {
   const std::size_t all = rays.world.size();
   if (all <= most) return rays;
-  BuiltRays some;
+  // Multiples of the golden section: equal steps would meet the same column of every row of a picture.
+  constexpr Real kGolden = 0.6180339887498949;
+  std::set<std::size_t> taken;
   for (std::size_t i = 0; i < most; ++i) {
-    some.world.push_back(rays.world[i * all / most]);
-    some.local.push_back(rays.local[i * all / most]);
+    const Real multiple = (static_cast<Real>(i) + 0.5) * kGolden;
+    taken.insert(std::min(all - 1, static_cast<std::size_t>((multiple - std::floor(multiple)) * static_cast<Real>(all))));
+  }
+  BuiltRays some;
+  for (const std::size_t ray : taken) {
+    some.world.push_back(rays.world[ray]);
+    some.local.push_back(rays.local[ray]);
   }
   return some;
 }

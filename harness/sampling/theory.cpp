@@ -13,30 +13,31 @@
 
 namespace nullmark {
 
-RayProfile::Lookup lookups_along(const Medium& medium, const Ray& local) {
-  return [&medium, local](const Real* t, std::size_t n, Real* out) {
+RayProfile::Lookup lookups_along(const Medium& medium, const Ray& local, std::uint64_t* count) {
+  return [&medium, local, count](const Real* t, std::size_t n, Real* out) {
+    if (count) *count += n;
     // Tens of thousands are asked for at once: points that stay in the cache cost no fresh pages.
     constexpr std::size_t kTogether = 512;
     std::array<Real, kTogether> x, y, z;
     for (std::size_t first = 0; first < n; first += kTogether) {
-      const std::size_t count = std::min(kTogether, n - first);
-      for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t now = std::min(kTogether, n - first);
+      for (std::size_t i = 0; i < now; ++i) {
         const Vec3 p = local.at(t[first + i]);
         x[i] = p.x(), y[i] = p.y(), z[i] = p.z();
       }
-      medium.extinction({x.data(), y.data(), z.data(), count}, out + first * static_cast<std::size_t>(medium.channels()));
+      medium.extinction({x.data(), y.data(), z.data(), now}, out + first * static_cast<std::size_t>(medium.channels()));
     }
   };
 }
 
-RayProfile make_profile(const Medium& medium, const Ray& local, const std::vector<Segment>& segments) {
+RayProfile make_profile(const Medium& medium, const Ray& local, const std::vector<Segment>& segments, std::uint64_t* count) {
   std::vector<Real> knots, ends, rates;
   sorted_knots(medium, local, knots);
   for (const Segment& segment : segments) {
     ends.push_back(segment.end);
     rates.push_back(segment.majorant);
   }
-  return RayProfile(lookups_along(medium, local), medium.channels(), knots, ends, rates);
+  return RayProfile(lookups_along(medium, local, count), medium.channels(), knots, ends, rates);
 }
 
 namespace {
@@ -51,6 +52,11 @@ class RayTheories {
   }
   std::size_t rays() const { return majorant_depth_.size(); }
   std::size_t channels() const { return channels_; }
+  Real mean_work(std::size_t query) const {
+    std::uint64_t sum = 0;
+    for (std::size_t ray = 0; ray < rays(); ++ray) sum += work_[ray * queries_ + query];
+    return static_cast<Real>(sum) / static_cast<Real>(rays());
+  }
   Real mean_majorant_depth() const {
     return std::accumulate(majorant_depth_.begin(), majorant_depth_.end(), Real{0}) / static_cast<Real>(rays());
   }
@@ -58,6 +64,7 @@ class RayTheories {
  private:
   std::size_t queries_, channels_;
   std::vector<Theory> all_;
+  std::vector<std::uint64_t> work_;  ///< [ray * queries + query]
   std::vector<Real> majorant_depth_;
 };
 
@@ -65,33 +72,38 @@ RayTheories::RayTheories(const Scene& scene, const std::vector<TheoryQuery>& que
     : queries_(queries.size()),
       channels_(static_cast<std::size_t>(scene.reference->channels)),
       all_(scene.rays->local.size() * queries_ * channels_),
+      work_(scene.rays->local.size() * queries_),
       majorant_depth_(scene.rays->local.size()) {
-  struct Memory {
+  struct ThreadMemory {
     std::vector<std::unique_ptr<Workspace>> workspaces;
     PreparedRay context;
   };
-  tbb::enumerable_thread_specific<Memory> memory([&] {
-    Memory mine;
+  tbb::enumerable_thread_specific<ThreadMemory> memory([&] {
+    ThreadMemory mine;
     for (const TheoryQuery& query : queries) mine.workspaces.push_back(query.kernel->workspace());
     return mine;
   });
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays()), [&](const auto& range) {
-    Memory& mine = memory.local();
+    ThreadMemory& mine = memory.local();
     for (std::size_t ray = range.begin(); ray < range.end(); ++ray) {
       const Medium& medium = *scene.medium->medium;
       std::optional<RayProfile> profile;
+      std::uint64_t count = 0, of_profile = 0;
       for (std::size_t k = 0; k < queries.size(); ++k) {
         const Kernel& kernel = *queries[k].kernel;
         std::optional<InFlight> named;
         if (queries[k].name) named.emplace(*queries[k].name);
         scene.context(ray, kernel, mine.context);
         if (!profile) {
-          profile.emplace(make_profile(medium, scene.rays->local[ray], mine.context.bounds.segments()));
+          profile.emplace(make_profile(medium, scene.rays->local[ray], mine.context.bounds.segments(), &count));
+          of_profile = count;
           for (const Segment& segment : mine.context.bounds.segments())
             majorant_depth_[ray] += segment.majorant * (segment.end - segment.begin);
         }
         kernel.begin_ray(*mine.workspaces[k], medium, scene.medium->extrema, mine.context);
+        const std::uint64_t before = count;
         const std::vector<Theory> theory = kernel.theory(*mine.workspaces[k], *profile, queries[k].quantity);
+        work_[ray * queries_ + k] = of_profile + count - before;
         for (std::size_t c = 0; c < channels_; ++c) all_[(ray * queries_ + k) * channels_ + c] = theory[c];
       }
     }
@@ -127,6 +139,7 @@ CellTheory theory_of_cell(const RayTheories& theories, std::size_t k, const Theo
   const std::size_t rays = theories.rays(), channels = theories.channels();
   const auto n = static_cast<Real>(rays);
   CellTheory cell;
+  cell.work = theories.mean_work(k);
   const Targets& targets = *query.targets;
   const std::size_t outputs = targets.outputs;
   const bool one_per_channel = targets.names.empty();

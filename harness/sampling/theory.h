@@ -21,6 +21,7 @@ struct CellTheory {
   std::vector<Real> ray_variance, ray_shift;
   bool infinite_variance = false;                       ///< stated for some ray: no sample variance can be trusted
   std::vector<Real> ray_lookups, ray_lookups_variance;  ///< per ray; empty unless known for all
+  Real work = 0;  ///< points of the medium that the theory of a ray looked at, on average: what it costs
 };
 
 /// Theory of several kernels over one scene; the profile of each ray is computed once for all of them.
@@ -33,10 +34,11 @@ struct TheoryQuery {
 };
 std::vector<CellTheory> compute_theory(const Scene& scene, const std::vector<TheoryQuery>& queries);
 
-/// The extinction at distances along a ray.
-RayProfile::Lookup lookups_along(const Medium& medium, const Ray& local);
+/// The extinction at distances along a ray.  Adds the number of distances to `count`.
+RayProfile::Lookup lookups_along(const Medium& medium, const Ray& local, std::uint64_t* count = nullptr);
 
 /// The extinction along a ray, cut at the medium's knots and the segments' ends.
-RayProfile make_profile(const Medium& medium, const Ray& local, const std::vector<Segment>& segments);
+RayProfile make_profile(const Medium& medium, const Ray& local, const std::vector<Segment>& segments,
+                        std::uint64_t* count = nullptr);
 
 }  // namespace nullmark

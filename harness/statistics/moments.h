@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "media/base/types.h"
@@ -69,6 +70,13 @@ class GroupErrors {
     Real sum_of_squares = 0;
     std::uint64_t groups = 0;
   };
+
+  GroupErrors() = default;
+  /// Complete groups that were counted before.
+  explicit GroupErrors(std::vector<Level> levels) : levels_(std::move(levels)) {
+    pending_.resize(levels_.size(), 0);
+    has_pending_.resize(levels_.size(), false);
+  }
 
   /// Adds the next errors of a ray.  Their number is the same power of two each time; the last call may have fewer.
   void add(std::span<const Real> errors);

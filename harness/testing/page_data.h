@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "harness/report/packing.h"
+#include "harness/io/packing.h"
 
 namespace nullmark {
 

@@ -27,7 +27,7 @@ MERGE = SUBMIT.with_name("merge")
 
 
 def configuration(short, long):
-    """Part k of four has the cells k and k + 4, in this order: one that takes milliseconds, and one that takes seconds."""
+    """Each of four tasks has one short cell, which takes milliseconds, and then a part of each long cell, which take a second."""
     def experiment(name, samples, matrix):
         return {"name": name, "rays": "single", "samples_per_ray": samples, "matrix": matrix}
     matrix = {"estimator": ["ratio", "delta"], "medium": ["linear", "cosine"]}
@@ -208,7 +208,8 @@ def program_of(results):
 
 def cells_in_journal(results):
     journal = Path(results + ".journal")
-    return journal.read_text().count('"status":"ok"') if journal.exists() else 0
+    text = journal.read_text() if journal.exists() else ""
+    return text.count('"status":"ok"') + text.count('"drawn_parts":')
 
 
 def log_of(job):
@@ -218,11 +219,11 @@ def log_of(job):
 
 
 def expect_resumed(log):
-    """The second attempt finds the short cell and runs the long one alone."""
+    """The second attempt finds the short cell and draws the parts of the long ones alone."""
     first, found, second = log.partition("task: attempt 2: finished cells: 1\n")
     expect(found and "] short/" in first, f"expected a second attempt that finds one cell\n{log}")
-    expect(not re.search(r"\] long/\S+ ok", first), f"the first attempt ended before it was interrupted\n{log}")
-    expect(re.search(r"\] long/\S+ ok", second), f"expected that the second attempt runs the long cell\n{log}")
+    expect(not re.search(r"\] long/\S+ part", first), f"the first attempt ended before it was interrupted\n{log}")
+    expect(re.search(r"\] long/\S+ part", second), f"expected that the second attempt draws the long parts\n{log}")
     expect("] short/" not in second, f"the second attempt runs the short cell again\n{log}")
 
 
@@ -252,7 +253,7 @@ def slurm_test(folder):
         running.pop(wait_for(lambda: next(filter(cells_in_journal, running), None)))()
 
     # Such a task would be requeued for ever.
-    endless, never = slurm.submit("endless.json", 3)
+    endless, never = slurm.submit("endless.json", 1)
     wait_for(lambda: program_of("endless.1-of-1.results.json"))
     time.sleep(0.5)
     run("scancel", "--signal=USR1", "--batch", f"{endless}_1")
@@ -271,11 +272,11 @@ def slurm_test(folder):
     for task in (1, 2):
         expect_resumed(log_of(f"{array}_{task}"))
         expect(slurm.show(f"{array}_{task}", "Restarts") == "1", f"task {task}: expected one restart")
-    say("tasks 1 and 2 resumed: their second attempts found one cell and ran the other")
+    say("tasks 1 and 2 resumed: their second attempts found one cell and drew the parts of the others")
     expect_equal("c.results.json", "whole.json")
 
     Path(part[2]).unlink()
-    told = run(MERGE, PROGRAM, "c", TASKS, code=5)
+    told = run(MERGE, PROGRAM, "c.json", "c", TASKS, code=5)
     expect(f"merge: {part[2]}: missing" in told, told)
     say(told.strip())
     Path("c.results.json").unlink()

@@ -15,22 +15,18 @@
 namespace nullmark {
 namespace {
 
-Real lookups_of_a_sample(const Sampled& sampled) {
-  return static_cast<Real>(sampled.counters.lookups) / static_cast<Real>(std::max<std::uint64_t>(1, sampled.counters.samples));
-}
-
 /// Variances from samples of their own, where theory has none; some of them are kept.
-std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSamples>& kept, const std::function<bool()>& stop) {
-  const std::uint64_t per_ray = prepared.kernel->pilot_samples().value_or(prepared.samples_per_ray);
-  if (per_ray < 2) return std::nullopt;
+void run_pilot(const PreparedCell& prepared, const std::function<bool()>& stop, DrawnPilot& drawn) {
+  const SampleSpan span = pilot_span(prepared);
+  if (span.per_ray < 2) return;
   const auto sampled =
-      sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets,
-                  {.first = first_sample::kPilot, .per_ray = per_ray, .keep = true}, nullptr, stop, [](double) {});
-  if (!sampled) return std::nullopt;
-  if (sampled->counters.overruns == 0) kept.push_back(sampled->kept);
-  Pilot pilot;
+      sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, span, nullptr, stop, [](double) {});
+  if (!sampled) return;
+  if (sampled->counters.overruns == 0) drawn.kept = sampled->kept;
+  drawn.pilot.emplace();
+  Pilot& pilot = *drawn.pilot;
   const std::size_t outputs = prepared.targets.outputs;
-  const auto n = static_cast<Real>(per_ray);
+  const auto n = static_cast<Real>(span.per_ray);
   std::vector<Real> second(outputs), fourth(outputs), raw(outputs);  // central moments, summed over the rays
   for (std::size_t i = 0; i < sampled->moments.size(); ++i) {
     const Moments& x = sampled->moments[i];
@@ -53,7 +49,6 @@ std::optional<Pilot> run_pilot(const PreparedCell& prepared, std::vector<KeptSam
     const bool seen = second[o] > kCancelled * raw[o] && fourth[o] >= std::numeric_limits<Real>::min();
     pilot.variance_of_variance = std::max(pilot.variance_of_variance, seen ? fourth[o] / (second[o] * second[o]) - 1 / count : 1);
   }
-  return pilot;
 }
 
 /// Means per ray and output of the tracker that a difference subtracts: what its margins are relative to.
@@ -67,32 +62,16 @@ std::vector<Real> means_of_subtracted(const PreparedCell& prepared, const std::f
   return means;
 }
 
-/// Laws of how the cell's samples and walks behave, where its configuration asks for them; and what of them is not tested.
-std::vector<LawRecord> laws_of(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,
-                               std::span<const KeptSamples> kept, std::vector<std::string>& untested,
-                               const std::function<bool()>& stop) {
-  constexpr const char* kTooLong = "walks take more lookups than a recording holds";
-  std::vector<LawRecord> laws;
-  const LawPolicy policy = prepared.cell->verdict.laws;
-  const bool violates = prepared.needs_bound && !prepared.scene->bounding, judged = plan.against == "reference" && !violates;
-  if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !plan.undecidable.empty()))) {
-    auto of_walks = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range,
-                              prepared.theory, {.each = lookups_of_a_sample(sampled)}, stop);
-    if (of_walks)
-      laws = *std::move(of_walks);
-    else
-      untested.push_back(fmt::format("laws of walks: {}", kTooLong));
-  }
-  // Bins are coarse; where weights are 1 the distribution itself can be looked at.
-  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path) {
-    const std::string why_not = why_no_free_path_laws(*prepared.scene, prepared.range, prepared.theory);
-    if (!why_not.empty()) untested.push_back("distribution of free paths: " + why_not);
-    const std::vector<LawRecord> of_flights =
-        free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop);
-    if (of_flights.empty() && why_not.empty()) untested.push_back(fmt::format("distribution of free paths: {}", kTooLong));
-    laws.insert(laws.end(), of_flights.begin(), of_flights.end());
-  }
-  if (judged && !plan.variances.empty()) {
+/// Whether laws tell of the cell: it is judged against the reference, under a bound where its tracker needs one.
+bool against_reference(const PreparedCell& prepared, const TestPlan& plan) {
+  return plan.against == "reference" && (!prepared.needs_bound || prepared.scene->bounding);
+}
+
+/// Laws of the cell's samples, and what of them is not tested.
+void add_laws_of_samples(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,
+                         std::span<const KeptSamples> kept, const std::function<bool()>& stop, WalkLaws& all) {
+  std::vector<LawRecord>& laws = all.laws;
+  if (against_reference(prepared, plan) && !plan.variances.empty()) {
     std::vector<Real> logs;
     for (std::size_t i = 0; i < plan.variances.size(); ++i)
       logs.push_back(test_record(plan.variances[i], sampled.variances[i]).log_e_fail);
@@ -102,12 +81,11 @@ std::vector<LawRecord> laws_of(const PreparedCell& prepared, const TestPlan& pla
   }
   const auto identity = prepared.source ? prepared.source->identity() : std::nullopt;
   if (identity && !identity->repeatable) {
-    untested.push_back("replay: the tracker says that its samples cannot be drawn again");
-    return laws;
+    all.untested.emplace_back("replay: the tracker says that its samples cannot be drawn again");
+    return;
   }
   if (const LawRecord law = replay_law(prepared.planned(), *prepared.scene, *prepared.kernel, kept, stop); law.samples > 0)
     laws.push_back(law);
-  return laws;
 }
 
 /// Whether the samples' own spread says that their mean is off, by more than ten samples of 1 that they have not shown could make
@@ -168,11 +146,11 @@ class Judging {
     open_reason_ += "; " + plan.remedies;
   }
 
-  void add_laws(std::vector<LawRecord> laws, std::vector<std::string> untested) {
-    verdict_.laws = std::move(laws);
-    verdict_.untested = std::move(untested);
+  void add_laws(WalkLaws laws) {
+    verdict_.laws = std::move(laws.laws);
+    verdict_.untested = std::move(laws.untested);
+    verdict_.counted_walks = laws.counted_walks;
   }
-  void count_lookups(std::uint64_t walks) { verdict_.counted_walks = walks; }
 
   const VerdictRecord& decided() {
     const bool seen = prepared_.scene->exceeds_bound || violations_ > 0;
@@ -182,24 +160,15 @@ class Judging {
     verdict_.tests.clear();
     for (std::size_t i = 0; i < plan_.tests.size(); ++i) {
       verdict_.tests.push_back(test_record(plan_.tests[i], evidence_[i]));
-      if (plan_.tests[i].channel == MeanTest::kLookups && verdict_.counted_walks > 0) verdict_.tests.back().basis = TestBasis::counted;
+      if (plan_.tests[i].channel == MeanTest::kLookups && verdict_.counted_walks > 0)
+        verdict_.tests.back().basis = TestBasis::counted;
     }
     decide(verdict_, prepared_.targets.names);
     return verdict_;
   }
 
   /// The samples to draw next of every ray, of a verdict that was just decided; none where it stands.
-  SampleSpan next() const {
-    const std::uint64_t drawn = verdict_.samples_per_ray;
-    if (!open() || drawn >= plan_.allowance) return {};
-    // As many again until the planned ones are drawn; then steps of a quarter overshoot by an eighth.
-    const std::uint64_t wanted = drawn < plan_.planned ? std::min(drawn, plan_.planned - drawn) : drawn / 4;
-    // Whole sums, and whole blocks of walks where there are many.
-    constexpr std::uint64_t kRound = 64, kMany = 1024;
-    const std::uint64_t round = drawn >= kMany ? kRound : plan_.longest_sum;
-    const std::uint64_t count = std::clamp<std::uint64_t>(wanted, 1, plan_.allowance - drawn);
-    return {.first = drawn, .per_ray = (count + round - 1) / round * round, .only_evidence = true};
-  }
+  SampleSpan next() const { return open() ? next_span(plan_, verdict_.samples_per_ray) : SampleSpan(); }
 
   void add(const Sampled& more, std::uint64_t per_ray) {
     for (std::size_t i = 0; i < evidence_.size(); ++i) evidence_[i] += more.evidence[i];
@@ -251,42 +220,106 @@ std::string why_not_judged(const PreparedCell& prepared) {
   return "";
 }
 
+bool needs_theory(const PreparedCell& prepared) {
+  // A consistent estimator's claim is a prediction of theory.
+  return prepared.cell->equal_lookups || prepared.claim == Guarantee::consistent || why_not_judged(prepared).empty();
+}
+
 bool tests_nothing(const PreparedCell& prepared) {
   const std::vector<Real>& depth = prepared.scene->reference->depth;
   return prepared.cell->quantity != Quantity::radiance &&
          std::all_of(depth.begin(), depth.end(), [](Real of_ray) { return of_ray == 0; });
 }
 
-std::optional<TestPlan> tests_of(const PreparedCell& prepared, const TestLevels& levels, std::vector<KeptSamples>& kept,
-                                 const std::function<bool()>& stop) {
-  if (!why_not_judged(prepared).empty()) return std::nullopt;
+SampleSpan pilot_span(const PreparedCell& prepared) {
+  return {.first = first_sample::kPilot,
+          .per_ray = prepared.kernel->pilot_samples().value_or(prepared.samples_per_ray),
+          .keep = true};
+}
+
+DrawnPilot draw_pilot(const PreparedCell& prepared, const std::function<bool()>& stop) {
+  DrawnPilot drawn;
+  if (!why_not_judged(prepared).empty()) return drawn;
   const bool spread_missing = !prepared.theory.ray_lookups.empty() && prepared.theory.ray_lookups_variance.empty();
-  std::optional<Pilot> pilot;
   const bool exact = prepared.claim == Guarantee::exact;
-  if ((prepared.theory.ray_variance.empty() && !exact) || spread_missing) pilot = run_pilot(prepared, kept, stop);
+  if ((prepared.theory.ray_variance.empty() && !exact) || spread_missing) run_pilot(prepared, stop, drawn);
+  if (prepared.subtracted) drawn.size = means_of_subtracted(prepared, stop);
+  return drawn;
+}
+
+std::optional<TestPlan> tests_of(const PreparedCell& prepared, const TestLevels& levels, const DrawnPilot& drawn) {
+  if (!why_not_judged(prepared).empty()) return std::nullopt;
   Targets targets = prepared.targets;
-  if (prepared.subtracted) targets.size = means_of_subtracted(prepared, stop);
-  return plan_tests(prepared.planned(), *prepared.scene, targets, prepared.range, prepared.claim, prepared.theory, pilot, levels);
+  if (prepared.subtracted) targets.size = drawn.size;
+  return plan_tests(prepared.planned(), *prepared.scene, targets, prepared.range, prepared.claim, prepared.theory, drawn.pilot,
+                    levels);
+}
+
+SampleSpan next_span(const TestPlan& plan, std::uint64_t drawn) {
+  if (drawn >= plan.allowance) return {};
+  // As many again until the planned ones are drawn; then steps of a quarter overshoot by an eighth.
+  const std::uint64_t wanted = drawn < plan.planned ? std::min(drawn, plan.planned - drawn) : drawn / 4;
+  // Whole sums, and whole blocks of walks where there are many.
+  constexpr std::uint64_t kRound = 64, kMany = 1024;
+  const std::uint64_t round = drawn >= kMany ? kRound : plan.longest_sum;
+  const std::uint64_t count = std::clamp<std::uint64_t>(wanted, 1, plan.allowance - drawn);
+  return {.first = drawn, .per_ray = (count + round - 1) / round * round, .only_evidence = true};
+}
+
+std::uint64_t expected_samples(const PreparedCell& prepared, const TestPlan& plan) {
+  std::uint64_t samples = prepared.samples_per_ray;
+  if (plan.remedies.empty() && plan.planned <= plan.affordable)
+    samples = std::max(samples, plan.planned);
+  else if (prepared.cell->verdict.all_samples)
+    return plan.allowance;
+  if (plan.lookups.empty()) return samples;
+  // Beyond the planned samples walks are counted, of trackers that fly.
+  const std::uint64_t most = prepared.kernel->flies() ? std::min(plan.affordable, samples) : plan.affordable;
+  return plan.tests.back().planned <= most ? std::max(samples, plan.tests.back().planned) : samples;
+}
+
+WalkLaws draw_walk_laws(const PreparedCell& prepared, const TestPlan& plan, Real lookups_of_a_sample, Real alpha,
+                        const std::function<bool()>& stop) {
+  constexpr const char* kTooLong = "walks take more lookups than a recording holds";
+  WalkLaws drawn;
+  const LawPolicy policy = prepared.cell->verdict.laws;
+  const bool judged = against_reference(prepared, plan);
+  if (judged && (policy == LawPolicy::always || (policy == LawPolicy::undecided && !plan.undecidable.empty()))) {
+    auto of_walks = test_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, prepared.range,
+                              prepared.theory, {.each = lookups_of_a_sample}, stop);
+    if (of_walks)
+      drawn.laws = *std::move(of_walks);
+    else
+      drawn.untested.push_back(fmt::format("laws of walks: {}", kTooLong));
+  }
+  // Bins are coarse; where weights are 1 the distribution itself can be looked at.
+  if (judged && policy != LawPolicy::never && prepared.cell->quantity == Quantity::free_path) {
+    const std::string why_not = why_no_free_path_laws(*prepared.scene, prepared.range, prepared.theory);
+    if (!why_not.empty()) drawn.untested.push_back("distribution of free paths: " + why_not);
+    const std::vector<LawRecord> of_flights =
+        free_path_laws(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.range, prepared.theory, {}, stop);
+    if (of_flights.empty() && why_not.empty()) drawn.untested.push_back(fmt::format("distribution of free paths: {}", kTooLong));
+    drawn.laws.insert(drawn.laws.end(), of_flights.begin(), of_flights.end());
+  }
+  // A mean to a hundredth would take more samples than the rest of the verdict.
+  if (!plan.lookups.empty() && plan.tests.back().planned > std::max(prepared.samples_per_ray, plan.planned))
+    drawn.counted_walks = counted_walks(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, alpha, stop);
+  return drawn;
 }
 
 std::optional<VerdictRecord> judge(const PreparedCell& prepared, const TestPlan& plan, const Sampled& sampled,
-                                   std::span<const KeptSamples> kept, const ErrorRates& levels, const Families& families,
-                                   Effort& effort, const std::function<bool()>& stop,
-                                   const std::function<void(double)>& progress) {
+                                   std::span<const KeptSamples> kept, WalkLaws laws, const ErrorRates& levels,
+                                   const Families& families, Effort& effort, const DrawSpan& draw,
+                                   const std::function<bool()>& stop) {
   Judging judging(prepared, plan, sampled, levels, families);
-  std::vector<std::string> untested = plan.untested;
-  std::vector<LawRecord> laws = laws_of(prepared, plan, sampled, kept, untested, stop);
-  judging.add_laws(std::move(laws), std::move(untested));
-  // A mean to a hundredth would take more samples than the rest of the verdict.
-  if (!plan.lookups.empty() && plan.tests.back().planned > std::max(prepared.samples_per_ray, plan.planned))
-    judging.count_lookups(
-        counted_walks(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.theory, levels.alpha_pass, stop));
+  add_laws_of_samples(prepared, plan, sampled, kept, stop, laws);
+  laws.untested.insert(laws.untested.begin(), plan.untested.begin(), plan.untested.end());
+  judging.add_laws(std::move(laws));
   for (;;) {
     const VerdictRecord& verdict = judging.decided();
     const SampleSpan span = judging.next();
     if (span.per_ray == 0) return verdict;
-    const auto more =
-        sample_cell(prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, span, &plan, stop, progress);
+    const auto more = draw(span);
     if (!more) return std::nullopt;
     effort += *more;
     judging.add(*more, span.per_ray);

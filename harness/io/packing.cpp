@@ -1,7 +1,8 @@
-#include "harness/report/packing.h"
+#include "harness/io/packing.h"
 
 #include <boost/archive/iterators/base64_from_binary.hpp>
 #include <boost/archive/iterators/binary_from_base64.hpp>
+#include <boost/archive/iterators/dataflow_exception.hpp>
 #include <boost/archive/iterators/transform_width.hpp>
 #include <boost/iostreams/copy.hpp>
 #include <boost/iostreams/device/array.hpp>
@@ -38,6 +39,30 @@ std::string packed(const std::string& text) {
   stream.push(io::back_inserter(bytes));
   io::copy(io::array_source(text.data(), text.size()), stream);
   return base64(bytes);
+}
+
+std::optional<std::string> unpacked(std::string_view text, std::size_t most) {
+  namespace io = boost::iostreams;
+  try {
+    const std::string bytes = from_base64(text);
+    io::filtering_istream stream;
+    stream.push(io::gzip_decompressor());
+    stream.push(io::array_source(bytes.data(), bytes.size()));
+    // Otherwise what is damaged would only look shorter.
+    stream.exceptions(std::ios::badbit);
+    std::string result, part(std::size_t{1} << 16, 0);
+    while (stream.read(part.data(), static_cast<std::streamsize>(part.size())) || stream.gcount() > 0) {
+      result.append(part, 0, static_cast<std::size_t>(stream.gcount()));
+      if (result.size() > most) return std::nullopt;
+    }
+    return result;
+  } catch (const io::gzip_error&) {
+    return std::nullopt;
+  } catch (const std::ios_base::failure&) {
+    return std::nullopt;
+  } catch (const boost::archive::iterators::dataflow_exception&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace nullmark
