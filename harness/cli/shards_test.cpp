@@ -80,7 +80,7 @@ TEST_F(Shards, AKilledShardKeepsItsParts) {
 TEST_F(Shards, AShardThatIsKilledGoesOnAfterItsParts) {
   write("k.json", R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[
       {"name":"k","rays":{"type":"orthographic","width":64,"height":64},"verdict":{"enabled":false},
-       "matrix":{"samples_per_ray":[256,8192],"estimator":"ratio","medium":{"type":"cosine","optical_depth":3}}}]})");
+       "matrix":{"samples_per_ray":[256,4096],"estimator":"ratio","medium":{"type":"cosine","optical_depth":3}}}]})");
   const auto results_file = folder_ / "k.1-of-2.results.json", journal_file = folder_ / "k.1-of-2.results.json.journal";
   // A whole line after the head: one that is cut is dropped.
   const auto holds_a_part = [&] {
