@@ -29,7 +29,6 @@
 #include "harness/report/export.h"
 #include "harness/report/junit.h"
 #include "harness/report/warnings.h"
-#include "harness/run/merge.h"
 #include "harness/run/provenance.h"
 #include "media/volumes/vdb_writer.h"
 

@@ -5,9 +5,7 @@
 #include <algorithm>
 
 #include "harness/cli/commands.h"
-#include "harness/cli/process.h"
 #include "harness/io/file_io.h"
-#include "harness/io/fitted.h"
 #include "harness/io/notice.h"
 #include "harness/io/outputs.h"
 #include "harness/io/results_json.h"

@@ -187,7 +187,8 @@ void visit_findings(Visit& visit, CellRecord& record) {
   visit.required("status", record.status);
   visit.sparse("reason", record.reason);
   visit.sparse("part", record.part, "of a cell that shards share: which part of its samples is drawn");
-  visit.sparse("drawn_parts", record.drawn_parts, "the statistics of these samples, packed; `merge` and `run --resume` read them");
+  visit.sparse("drawn_parts", record.drawn_parts,
+               "the statistics of these samples, packed; `merge` and `run --resume` read them");
   visit.sparse("build", record.build, "compiler, C library and instruction set of the cell, where not those of the provenance");
   visit.sparse("reliance", record.reliance,
                "of an estimator that is handed the exact optical depth: how much of its answer follows that depth, 1 all of it");

@@ -62,7 +62,7 @@ CellCost cost_of(const PreparedCell& prepared, const TestLevels& levels, std::ui
 /// Parts of a cell: small ones, so that errors of the forecast even out, where what each part does for itself is little beside
 /// its samples; large ones otherwise.
 std::size_t parts_of(const CellCost& cost, double mean, std::size_t shards) {
-  constexpr double kSmall = 1. / 32, kLarge = 1. / 8, kLittle = 0.05, kLeast = 1e7;
+  constexpr double kSmall = 1. / 64, kLarge = 1. / 8, kLittle = 0.05, kLeast = 1e7;
   const double small = cost.spread / (kSmall * mean), large = cost.spread / (kLarge * mean);
   const double cheap = kLittle * cost.spread / std::max(cost.each, 1.);
   const auto possible = static_cast<double>(std::min(shards, cost.portions));
