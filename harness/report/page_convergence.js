@@ -67,11 +67,6 @@ function floorTrace(cell, ends, theme) {
   };
 }
 
-/** The legend's line for all floors, which have the colours of their trackers. */
-function floorKey(theme) {
-  return { type: "scatter", mode: "lines", name: "floor of a bias", x: [null], y: [null], line: { color: theme.muted, dash: "dash", width: 1 }, hoverinfo: "skip" };
-}
-
 function guideTrace(scene, curves, view, ends, theme) {
   const { steps } = curves.find(({ cell }) => cell.index === scene.best_unbiased) ?? curves[0];
   const start = steps[0];
@@ -95,10 +90,9 @@ function convergencePlot(scene, view, width, theme) {
   const { shown } = convergenceCurves(scene, view);
   const xs = shown.flatMap(({ steps }) => steps.map(({ x }) => x.value));
   const ends = [Math.min(...xs), Math.max(...xs)];
-  const floors = floorsOf(shown, view).map((cell) => floorTrace(cell, ends, theme));
+  // One floor stands for all in the legend.
   const traces = [
-    ...floors,
-    ...(floors.length > 0 ? [floorKey(theme)] : []),
+    ...floorsOf(shown, view).map((cell, i) => ({ ...floorTrace(cell, ends, theme), ...(i === 0 ? { showlegend: true, name: "floor of a bias" } : {}) })),
     guideTrace(scene, shown, view, ends, theme),
     ...shown.map((curve) => convergenceTrace(curve, view, theme)),
   ];
