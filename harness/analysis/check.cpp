@@ -134,9 +134,9 @@ ExitCode exit_of(const Summary& summary) {
   if (summary.errors > 0 || summary.altered > 0) return ExitCode::internal_error;
   if (summary.pass + summary.agree + summary.expected_open + summary.unexpected_open + summary.violated == 0 && !told && !untold)
     return ExitCode::nothing_ran;
-  const bool open = summary.never_started > 0 || summary.unexpected_open > 0 || (summary.pass == 0 && !told) || untold ||
-                    !summary.nothing_proven.empty() || !summary.undecided_trackers.empty() ||
-                    (summary.strict && summary.undecided_claims > 0);
+  const bool open = summary.never_started > 0 || summary.drawn_in_part > 0 || summary.unexpected_open > 0 ||
+                    (summary.pass == 0 && !told) || untold || !summary.nothing_proven.empty() ||
+                    !summary.undecided_trackers.empty() || (summary.strict && summary.undecided_claims > 0);
   return open ? ExitCode::inconclusive : summary.exit;
 }
 
@@ -147,7 +147,8 @@ Summary summarise(RunRecord& run, bool strict) {
   summary.strict = strict;
   for (CellRecord& record : run.cells) {
     count_cell(record, summary);
-    summary.never_started += record.status == Status::not_run;
+    summary.never_started += record.status == Status::not_run && record.drawn_parts.empty();
+    summary.drawn_in_part += !record.drawn_parts.empty();
   }
   summary.configured = configured_cells(run, [](const Json&) { return true; });
   summary.selected = selected_cells(run).value_or(summary.configured);

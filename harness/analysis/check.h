@@ -21,6 +21,7 @@ struct Summary {
   std::size_t configured = 0;              ///< cells of the configuration
   std::size_t selected = 0;                ///< cells that the run was to cover: selected by `--filter`, regardless of `--shard`
   std::size_t never_started = 0;           ///< interrupted, out of time, or absent from the file though selected
+  std::size_t drawn_in_part = 0;           ///< parts of the cell are in the file, and no verdict
   std::size_t undecided_claims = 0;        ///< cells that claim something and neither passed nor failed, including skipped ones
   bool strict = false;                     ///< each undecided claim then prevents success
   std::size_t altered = 0;                 ///< verdicts in the file that contradict its figures

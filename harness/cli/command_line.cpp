@@ -202,7 +202,9 @@ class CommandLine {
       const std::vector<RunRecord> runs = load_all(files_);
       const std::string ranking = compare_text(runs, baseline_, paired_, {terminal_width(), columns_});
       if (ranking.empty()) {
-        notice("nullmark: no cell of these results was sampled, or they are pairs, which are not ranked; nothing to compare\n");
+        notice(
+            "nullmark: no cell of these results was sampled as a whole, or they are pairs, which are not ranked; nothing to "
+            "compare; `merge` joins shards\n");
         return ExitCode::nothing_ran;
       }
       tell("{}", wrapped(ranking, terminal_width()));

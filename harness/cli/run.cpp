@@ -112,7 +112,7 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected, bool timin
        seconds * run.weight(), timing && plan.timing.enabled ? fmt::format(" and {:.3g} s of timing", run.timing_seconds) : "");
   if (shard.count > 1) {
     const double mean = std::accumulate(dealt.loads.begin(), dealt.loads.end(), 0.) / static_cast<double>(shard.count);
-    tell("shard {}: {:.3f} of the mean load, the largest has {:.3f}; {} cells are split\n", shard.text(),
+    tell("shard {}: {:.3f} of the mean load, the largest has {:.3f}; {} cells are split, and shown whole here\n", shard.text(),
          dealt.loads[shard.index] / mean, *std::max_element(dealt.loads.begin(), dealt.loads.end()) / mean, dealt.split_cells());
   }
   if (any) return ExitCode::ok;

@@ -48,7 +48,9 @@ TEST_F(Shards, ShareLargeCellsAndMergeToTheWholeRun) {
   const RunRecord first = results("c.1-of-3.results.json");
   EXPECT_EQ(std::count_if(first.cells.begin(), first.cells.end(), [](const CellRecord& cell) { return !cell.part.empty(); }), 2);
   EXPECT_NE(run("check c.1-of-3.results.json"), 0);
-  EXPECT_NE(read("out").find("were never started"), std::string::npos) << read("out");
+  EXPECT_NE(read("out").find("2 cells are drawn in part: `merge`"), std::string::npos) << read("out");
+  ASSERT_EQ(run("merge c.1-of-3.results.json c.3-of-3.results.json -o two.json"), 0) << read("err");
+  EXPECT_NE(read("err").find("shard 2/3 is missing; run it and merge all again"), std::string::npos) << read("err");
   ASSERT_EQ(run("merge c.1-of-3.results.json c.2-of-3.results.json c.3-of-3.results.json -o m.json"), 0) << read("err");
   EXPECT_EQ(read("err"), "");
   EXPECT_EQ(statistics("m.json"), statistics("whole.json"));
@@ -106,7 +108,7 @@ TEST_F(Shards, AShardThatIsKilledGoesOnAfterItsParts) {
 TEST_F(Shards, AMissingShardLeavesCellsThatResumeDraws) {
   run_shards();
   ASSERT_EQ(run("merge c.1-of-3.results.json c.3-of-3.results.json -o m.json"), 0) << read("err");
-  EXPECT_NE(read("err").find("`nullmark run CONFIG --resume -o m.json` draws on"), std::string::npos) << read("err");
+  EXPECT_NE(read("err").find("`nullmark run CONFIG --resume -o m.json` draws them"), std::string::npos) << read("err");
   EXPECT_NE(run("check m.json"), 0);
   ASSERT_EQ(run("run c.json --resume -o m.json --no-timing"), 0) << read("err");
   EXPECT_EQ(statistics("m.json"), statistics("whole.json"));

@@ -70,6 +70,10 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
   }
   if (summary.never_started > 0)
     lines.push_back(fmt::format("{} cells of the configuration were never started", summary.never_started));
+  if (summary.drawn_in_part > 0)
+    lines.push_back(fmt::format(
+        "{} cells are drawn in part: `merge` joins the results of all shards, and `run --resume` draws what is missing",
+        summary.drawn_in_part));
   if (summary.altered > 0) lines.push_back(fmt::format("{} verdicts in the file are not what its figures say", summary.altered));
   lines.insert(lines.end(), summary.disagreements.begin(), summary.disagreements.end());
   lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());

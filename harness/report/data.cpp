@@ -216,16 +216,33 @@ std::string command_line(const Json& provenance) {
   return line;
 }
 
+/// How to get results again.  Of merged ones: the commands of their parts, and the merge.
+Json commands_of(const Json& provenance, const std::string& name) {
+  const std::string program = program_of(provenance);
+  Json commands = Json::array();
+  const Json parts = provenance.value("parts", Json::array());
+  for (const Json& part : parts)
+    if (const std::string line = command_line(part); std::find(commands.begin(), commands.end(), line) == commands.end())
+      commands.push_back(line);
+  if (parts.empty())
+    commands.push_back(command_line(provenance));
+  else
+    commands.push_back(fmt::format("{} merge PART... -o {}  # the results of the commands above", program, name));
+  commands.push_back(program + " check " + name);
+  commands.push_back(program + " compare " + name);
+  return commands;
+}
+
 Json run_json(const RunRecord& run, const Summary& summary, const std::string& file) {
   Json provenance = Json::object();
   for (const auto& [key, text] : run.provenance) provenance[key] = known_json(text);
-  const std::string name = std::filesystem::path(file).filename().string(), program = program_of(provenance);
+  const std::string name = std::filesystem::path(file).filename().string();
   return {{"name", run.name},
           {"file", name},
           {"version", measured_by(run)},
           {"remarks", Json::array()},
           {"config_hash", config_hash(run.config_text)},
-          {"commands", {command_line(provenance), program + " check " + name, program + " compare " + name}},
+          {"commands", commands_of(provenance, name)},
           {"provenance", std::move(provenance)},
           {"verdicts",
            {{"pass", summary.pass},

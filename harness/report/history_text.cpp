@@ -143,9 +143,9 @@ std::string changes_line(const History& history) {
                          : fmt::format("; other samples_per_ray in {}", step.other_samples);
   const auto verdicts = std::count_if(step.undecided.begin(), step.undecided.end(),
                                       [](const CellChange& one) { return one.change == Change::verdict; });
-  return verdicts == 0
-             ? text
-             : text + fmt::format("; {} verdict{}, which may be chance", verdicts, verdicts == 1 ? " differs" : "s differ");
+  if (verdicts == 0) return text;
+  return text + fmt::format("; {} verdict{}, which {}", verdicts, verdicts == 1 ? " differs" : "s differ",
+                            step.other_samples > 0 ? "other samples can do" : "may be chance");
 }
 
 std::string history_text(const History& history, std::size_t width) {

@@ -5,7 +5,7 @@ function commandBlock(lines) {
 }
 
 function provenanceText(value) {
-  if (Array.isArray(value)) return value.join(" ");
+  if (Array.isArray(value)) return value.map(provenanceText).join(value.some((one) => one !== null && typeof one === "object") ? "; " : " ");
   if (value !== null && typeof value === "object") return Object.entries(value).map(([key, inner]) => `${key} ${provenanceText(inner)}`).join(", ");
   return String(value);
 }

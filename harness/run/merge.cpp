@@ -141,8 +141,13 @@ RunRecord merge_results(const std::vector<RunRecord>& parts, const std::vector<s
   merged.provenance = parts[0].provenance;
   Json list = Json::array();
   for (const RunRecord& part : parts) {
-    list.push_back(Json::object());
-    for (const auto& [key, text] : part.provenance) list.back()[key] = known_json(text);
+    Json one = Json::object();
+    for (const auto& [key, text] : part.provenance) one[key] = known_json(text);
+    const Json of_parts = one.value("parts", Json());
+    if (of_parts.is_array())
+      list.insert(list.end(), of_parts.begin(), of_parts.end());
+    else
+      list.push_back(std::move(one));
   }
   merged.provenance["parts"] = list.dump();
   // Parts of one selection make it whole; those of several are measured by the whole configuration.

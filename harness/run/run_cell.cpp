@@ -72,7 +72,7 @@ class CellRun {
   /// Theory, the pilot and the plan of the tests.  False if the cell cannot go on.
   bool prepare() {
     const bool known = stored_ && stored_->common;
-    if (stored_ && !known && !task_.may_draw) return leave_open("its first part is missing");
+    if (stored_ && !known && !task_.may_draw) return leave_open("the first part of the cell is missing");
     if (known) {
       if (!fits(stored_->common->theory, prepared_)) fail_stored();
       take_theory(prepared_, stored_->common->theory);
@@ -136,8 +136,10 @@ class CellRun {
     const SpanCut cut(rays, span);
     if (all.size() < cut.portions()) {
       if (!task_.may_draw) {
-        leave_open(fmt::format("samples {} to {} of each ray are {}", span.first, span.first + span.per_ray - 1,
-                               all.empty() ? "wanted, which no part has drawn" : "not drawn by all parts"));
+        leave_open(
+            fmt::format("{} of samples {} to {} of each ray {} not drawn",
+                        all.empty() ? "all" : fmt::format("{} of {} portions", cut.portions() - all.size(), cut.portions()),
+                        span.first, span.first + span.per_ray - 1, all.empty() ? "are wanted and" : "are"));
         return std::nullopt;
       }
       std::optional<Portions> rest = draw(span, [&](std::size_t number) { return !all.contains(number); });
@@ -154,7 +156,7 @@ class CellRun {
   }
 
   bool leave_open(const std::string& why) {
-    record_.reason = why + "; `run --resume` draws them";
+    record_.reason = why + "; `run --resume` draws what is missing";
     open_ = true;
     return false;
   }

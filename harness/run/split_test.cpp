@@ -163,7 +163,7 @@ TEST(SplitCells, WhatIsMissingIsDrawnLater) {
     EXPECT_EQ(part.open.size(), grey().cells.size());
     for (const CellRecord& record : part.run.cells) {
       EXPECT_EQ(record.status, Status::not_run);
-      EXPECT_NE(record.reason.find(missing == 0 ? "first part is missing" : "not drawn by all parts"), std::string::npos)
+      EXPECT_NE(record.reason.find(missing == 0 ? "first part of the cell is missing" : " are not drawn"), std::string::npos)
           << record.reason;
     }
     RunOptions options;
@@ -189,7 +189,7 @@ TEST(SplitCells, AVerdictMayAskForMoreThanIsDrawn) {
     open += part.open.size();
     for (const CellRecord& record : part.run.cells) {
       if (record.status == Status::ok) continue;
-      EXPECT_NE(record.reason.find("which no part has drawn; `run --resume`"), std::string::npos) << record.reason;
+      EXPECT_NE(record.reason.find("are wanted and not drawn; `run --resume`"), std::string::npos) << record.reason;
     }
     RunOptions options;
     options.timing = false;
