@@ -20,6 +20,7 @@
 #include "harness/io/spec_json.h"
 #include "harness/io/tables_json.h"
 #include "harness/io/text.h"
+#include "harness/model/distinct.h"
 
 namespace nullmark {
 namespace {
@@ -33,34 +34,17 @@ class PlanBuilder {
     Cell cell = configured.cell;
     cell.estimator = *configured.estimator;
     cell.minus = configured.minus;
-    cell.medium = media_.index_of(plan_.media, *configured.medium);
+    cell.medium = media_.place_in(plan_.media, *configured.medium);
     if (!(*configured.medium)->optional && plan_.media[cell.medium]->optional)
       plan_.media[cell.medium].edit([](MediumSpec& medium) { medium.optional = false; });
-    cell.majorant = majorants_.index_of(plan_.majorants, *configured.majorant);
-    cell.rays = ray_sets_.index_of(plan_.ray_sets, *configured.rays);
+    cell.majorant = majorants_.place_in(plan_.majorants, *configured.majorant);
+    cell.rays = ray_sets_.place_in(plan_.ray_sets, *configured.rays);
     plan_.cells.push_back(std::move(cell));
   }
 
  private:
-  /// Finds among thousands by label, which equal specifications share.
-  class Index {
-   public:
-    template <class Spec>
-    std::size_t index_of(std::vector<Shared<Spec>>& list, const Shared<Spec>& spec) {
-      std::vector<std::size_t>& places = of_label_[spec->label];
-      for (const std::size_t node : places)
-        if (list[node] == spec) return node;
-      places.push_back(list.size());
-      list.push_back(spec);
-      return list.size() - 1;
-    }
-
-   private:
-    std::map<std::string, std::vector<std::size_t>> of_label_;
-  };
-
   Plan& plan_;
-  Index media_, majorants_, ray_sets_;
+  Distinct media_, majorants_, ray_sets_;
 };
 
 bool same_statistics(const ConfiguredCell& a, const ConfiguredCell& b) {

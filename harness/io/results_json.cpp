@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <map>
 #include <set>
 
 #include "harness/io/claims_json.h"
@@ -11,28 +9,24 @@
 #include "harness/io/spec_json.h"
 #include "harness/io/tables_json.h"
 #include "harness/io/text.h"
+#include "harness/model/distinct.h"
 
 namespace nullmark {
 namespace {
 
 /// What cells have in common, equal specifications once, with labels that can be printed.
 template <class Spec>
-class Distinct {
+class SharedSpecs {
  public:
   void share(Shared<Spec>& spec) {
-    std::vector<Shared<Spec>>& alike = of_label_[spec->label];
-    // Specifications are equal whatever their pointers or labels.
-    const auto at = std::find(alike.begin(), alike.end(), spec);
-    if (at != alike.end()) {
-      spec = *at;
-      return;
-    }
-    if (printable(spec->label) != spec->label) spec.edit([](Spec& one) { one.label = printable(one.label); });
-    alike.push_back(spec);
+    Shared<Spec>& one = list_[distinct_.place_in(list_, spec)];
+    if (printable(one->label) != one->label) one.edit([](Spec& held) { held.label = printable(held.label); });
+    spec = one;
   }
 
  private:
-  std::map<std::string, std::vector<Shared<Spec>>> of_label_;  ///< as the file has it
+  Distinct distinct_;  ///< by labels as the file has them
+  std::vector<Shared<Spec>> list_;
 };
 
 }  // namespace
@@ -98,8 +92,8 @@ RunRecord read_results(const std::string& text, const std::string& file) {
   if (const std::size_t cells = top["cells"].json().size(); cells > kMostCells)
     top["cells"].fail(fmt::format("found {} cells; expected at most {}", cells, kMostCells));
   std::set<std::string> seen;
-  Distinct<Component> trackers, majorants, ray_sets;
-  Distinct<MediumSpec> media;
+  SharedSpecs<Component> trackers, majorants, ray_sets;
+  SharedSpecs<MediumSpec> media;
   for (const JsonNode& cell : top["cells"].elements()) {
     run.cells.push_back(read_cell(cell));
     CellRecord& record = run.cells.back();
