@@ -145,7 +145,7 @@ std::string changes_line(const History& history) {
                                       [](const CellChange& one) { return one.change == Change::verdict; });
   if (verdicts == 0) return text;
   return text + fmt::format("; {} verdict{}, which {}", verdicts, verdicts == 1 ? " differs" : "s differ",
-                            step.other_samples > 0 ? "other samples can do" : "may be chance");
+                            step.other_samples > 0 ? "chance or other samples can do" : "may be chance");
 }
 
 std::string history_text(const History& history, std::size_t width) {
