@@ -51,7 +51,7 @@ HistoryResult result_of(RunRecord run, const std::string& file) {
   result.commit = commit_of(run);
   result.cpu = told(run, "cpu", "model");
   result.build = counts_of(run, file).build.text();
-  summarise(run);
+  result.incomplete = run.cells.size() < summarise(run).configured;
   result.run = std::move(run);
   return result;
 }

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -45,6 +47,7 @@ struct HistoryResult {
   std::string date;    ///< of the start: "2026-11-20", with the time where two results share a day
   std::string commit;  ///< seven digits, "changed" behind them if the source was not that of the commit; empty: unknown
   std::string cpu, build;
+  bool incomplete = false;  ///< holds fewer cells than its configuration
   RunRecord run;
 };
 
@@ -52,11 +55,12 @@ struct HistoryResult {
 struct HistoryStep {
   std::size_t cells = 0, compared = 0;  ///< of either side; sampled on both
   std::size_t changed = 0;              ///< cells with a change
-  std::size_t other_samples = 0;        ///< sampled on both sides, with other numbers of samples a ray
-  std::vector<CellChange> changes;      ///< proven
-  std::vector<CellChange> undecided;    ///< may be chance
-  std::vector<std::string> notes;       ///< what was not compared, and why
-  std::string time;                     ///< why times have no verdict, or what the verdict rests on
+  /// Cells that are sampled on both sides, by the numbers of samples a ray before and after, where they differ.
+  std::map<std::pair<std::uint64_t, std::uint64_t>, std::size_t> other_samples;
+  std::vector<CellChange> changes;    ///< proven
+  std::vector<CellChange> undecided;  ///< may be chance
+  std::vector<std::string> notes;     ///< what was not compared, and why
+  std::string time;                   ///< why times have no verdict, or what the verdict rests on
 };
 
 /// Results of one configuration in the order of their dates.

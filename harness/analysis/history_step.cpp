@@ -39,6 +39,16 @@ std::string signed_percent(Real change) {
   return std::isfinite(change) ? fmt::format("{:+.3g} %", 100 * change) : std::string("from 0");
 }
 
+bool is_drawn_in_part(const CellRecord& record) { return !record.drawn_parts.empty(); }
+
+/// Why a sampled record has no errors of parts of its samples.
+const char* why_no_errors(const CellRecord& record) {
+  if (!record.outputs.empty()) return "several outputs";
+  const bool known = std::all_of(record.channel.begin(), record.channel.end(),
+                                 [](const ChannelRecord& channel) { return channel.reference.has_value(); });
+  return known && !record.channel.empty() ? "too few samples" : "no reference";
+}
+
 /// The mean of the parts' mean squared errors.
 Real mean_square(const std::vector<Real>& parts) {
   return std::accumulate(parts.begin(), parts.end(), Real{0}) / static_cast<Real>(parts.size());
@@ -85,16 +95,18 @@ class StepComparer {
   void match() {
     std::map<std::string, const CellRecord*> earlier;
     for (const CellRecord& record : before_.run.cells) earlier.emplace(record.cell.name, &record);
-    std::size_t left_out = 0;
+    std::size_t left_out = 0, in_part = 0;
     for (const CellRecord& after : after_.run.cells) {
       ++step_.cells;
       const auto at = earlier.find(after.cell.name);
       const CellRecord* before = at == earlier.end() ? nullptr : at->second;
       if (before) earlier.erase(at);
-      if (before &&
-          (is_sampled(*before) || is_sampled(after) || before->status == Status::error || after.status == Status::error))
+      if (is_drawn_in_part(after) || (before && is_drawn_in_part(*before)))
+        ++in_part;
+      else if (before &&
+               (is_sampled(*before) || is_sampled(after) || before->status == Status::error || after.status == Status::error))
         add_pair(*before, after);
-      else if (!before && !was_.partial)
+      else if (!before && !is_partial(before_, was_))
         changed(after.cell.name, Change::came, "", marked_word(after), "");
       else
         ++left_out;
@@ -102,14 +114,22 @@ class StepComparer {
     for (const CellRecord& before : before_.run.cells) {
       if (!earlier.contains(before.cell.name)) continue;
       ++step_.cells;
-      if (is_.partial)
+      if (is_partial(after_, is_))
         ++left_out;
       else
         changed(before.cell.name, Change::went, marked_word(before), "", "");
     }
+    if (in_part > 0)
+      step_.notes.push_back(
+          fmt::format("{} cell{} drawn in part, so not compared: merge the results of all shards, or draw the rest with "
+                      "`nullmark run CONFIG --resume`",
+                      in_part, in_part == 1 ? "" : "s"));
     if (left_out > 0)
       step_.notes.push_back(fmt::format("{} cell{} not selected in both, or not run", left_out, left_out == 1 ? "" : "s"));
   }
+
+  /// Whether cells may be absent that the configuration has: not selected, of a missing shard, or never started.
+  static bool is_partial(const HistoryResult& result, const Counts& counts) { return counts.partial || result.incomplete; }
 
   void add_pair(const CellRecord& before, const CellRecord& after) {
     const Kind was = kind_of(before), is = kind_of(after);
@@ -120,7 +140,8 @@ class StepComparer {
     pairs_.emplace_back(&before, &after);
     if (!is_sampled(before) || !is_sampled(after)) return;
     ++step_.compared;
-    if (before.cell.samples_per_ray != after.cell.samples_per_ray) ++step_.other_samples;
+    if (before.cell.samples_per_ray != after.cell.samples_per_ray)
+      ++step_.other_samples[{before.cell.samples_per_ray, after.cell.samples_per_ray}];
   }
 
   /// Whether the same build drew the same samples, so that no difference is chance.
@@ -156,7 +177,7 @@ class StepComparer {
   void compare_error(const CellRecord& before, const CellRecord& after, Real level) {
     const std::vector<Real>&was = before.squared_error_blocks, &is = after.squared_error_blocks;
     if (was.empty() || is.empty() || was.size() != is.size())
-      return not_compared("errors not compared: too few samples, several outputs or no reference", after);
+      return not_compared(fmt::format("errors not compared: {}", why_no_errors(was.empty() ? before : after)), after);
     if (before.samples != after.samples || before.rays != after.rays)
       return not_compared("errors not compared: other numbers of samples", after);
     const Real then = mean_square(was), now = mean_square(is);

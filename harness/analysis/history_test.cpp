@@ -168,6 +168,53 @@ TEST(History, DoesNotMissCellsThatWereNotSelected) {
   EXPECT_EQ(gone.notes.at(0), "1 cell not selected in both, or not run");
 }
 
+TEST(History, DoesNotCallCellsGoneThatAreDrawnInPartOrWereNeverStarted) {
+  const auto in_part = [](RunRecord& run) {
+    run.cells[1] = unsampled(run.cells[1], Status::not_run, "parts of the cell are drawn");
+    run.cells[1].drawn_parts = {"part"};
+  };
+  for (const HistoryStep& step : {last({dated(kOld), dated(kNew, in_part)}), last({dated(kOld, in_part), dated(kNew)})}) {
+    EXPECT_EQ(step.changed, 0u);
+    EXPECT_EQ(step.compared, 2u);
+    EXPECT_EQ(step.notes.at(0).find("1 cell drawn in part, so not compared: merge the results of all shards"), 0u)
+        << step.notes[0];
+  }
+  // Merged without a shard that had the last cell: nothing says that the cells were selected.
+  const auto without = [](RunRecord& run) {
+    run.cells.pop_back();
+    run.config_text = R"({"experiments":[{"include":[{},{},{}]}]})";
+  };
+  const HistoryStep gone = last({dated(kOld), dated(kNew, without)}), back = last({dated(kOld, without), dated(kNew)});
+  EXPECT_EQ(gone.changed + back.changed, 0u);
+  EXPECT_EQ(gone.notes.at(0), "1 cell not selected in both, or not run");
+}
+
+TEST(History, SaysWhyErrorsAreNotCompared) {
+  const auto note = [](auto plant) {
+    return last({dated(kOld), dated(kNew,
+                                    [&](RunRecord& run) {
+                                      run.cells[1].squared_error_blocks.clear();
+                                      plant(run.cells[1]);
+                                    })})
+        .notes.at(0);
+  };
+  EXPECT_EQ(note([](CellRecord&) {}), "errors not compared: too few samples in 1 cell");
+  EXPECT_EQ(note([](CellRecord& record) { record.outputs = {"one", "two"}; }), "errors not compared: several outputs in 1 cell");
+  EXPECT_EQ(note([](CellRecord& record) { record.channel[0].reference.reset(); }), "errors not compared: no reference in 1 cell");
+}
+
+TEST(History, NamesTheNumbersOfSamples) {
+  const History history = history_of({dated(kOld), dated(kNew,
+                                                         [](RunRecord& run) {
+                                                           for (std::size_t i = 0; i < 3; ++i)
+                                                             run.cells[i].cell.samples_per_ray = 17 + i;
+                                                         })},
+                                     {"a", "b"});
+  const std::string before = std::to_string(passed().cell.samples_per_ray);
+  EXPECT_EQ(changes_line(history), "nothing changed since 2026-11-20 (commit 0123abc) but samples_per_ray (" + before +
+                                       " → 17, " + before + " → 18, and 1 more), in 3 of 3 cells");
+}
+
 TEST(History, ComparesNoExactCountsOfAnotherBuildOrOfSamplesThatCannotBeDrawnAgain) {
   const auto more = [](RunRecord& run) { run.cells[1].lookups += 10; };
   const HistoryStep build = last({dated(kOld), dated(kNew, [&](RunRecord& run) {

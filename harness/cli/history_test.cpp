@@ -68,11 +68,12 @@ TEST_F(HistoryCli, NamesTheSettingThatIsNoChangeOfTheProgram) {
     measure(std::string(name) + ".config", std::string(name) + ".json", day, "");
   }
   ASSERT_EQ(run("history many.json few.json"), 0) << read("err");
-  EXPECT_EQ(first_line(), "nothing changed since 2026-11-20" + commit_shown() +
-                              " but samples_per_ray, in 1 of 1 cells; 1 verdict differs, which chance or other samples can do");
+  EXPECT_EQ(first_line(),
+            "nothing changed since 2026-11-20" + commit_shown() +
+                " but samples_per_ray (1000000 → 64), in 1 of 1 cells; 1 verdict differs, which chance or other samples can do");
   measure("few.config", "loose.json", "2026-11-26", "", NULLMARK_LOOSE_PROGRAM);
   ASSERT_EQ(run("history many.json loose.json"), 0) << read("err");
-  EXPECT_NE(first_line().find("; other samples_per_ray in 1"), std::string::npos) << read("out");
+  EXPECT_NE(first_line().find("; other samples_per_ray (1000000 → 64) in 1"), std::string::npos) << read("out");
 }
 
 TEST_F(HistoryCli, RefusesWhatIsNoSeriesInOneLine) {

@@ -118,6 +118,20 @@ std::string undecided_text(const std::vector<CellChange>& undecided, std::size_t
   return text + fitted(changes_table(few), 2, width, left_out);
 }
 
+/// "samples_per_ray (64 → 1024)", and how many cells have them.
+std::pair<std::string, std::size_t> other_samples(const HistoryStep& step) {
+  constexpr std::size_t kNamed = 2;
+  std::size_t cells = 0;
+  Line named;
+  for (const auto& [numbers, count] : step.other_samples) {
+    cells += count;
+    if (named.size() < kNamed) named.push_back(fmt::format("{} → {}", numbers.first, numbers.second));
+  }
+  const std::size_t more = step.other_samples.size() - named.size();
+  return {fmt::format("samples_per_ray ({}{})", fmt::join(named, ", "), more > 0 ? fmt::format(", and {} more", more) : ""),
+          cells};
+}
+
 }  // namespace
 
 std::string verdicts_counted(const RunRecord& run) {
@@ -135,17 +149,17 @@ std::string changes_line(const History& history) {
   std::string text;
   if (step.changed > 0)
     text = fmt::format("{} of {} cells changed since {}: {}", step.changed, step.cells, since, changes_counted(step));
-  else if (step.other_samples == 0)
+  else if (step.other_samples.empty())
     text = fmt::format("nothing changed since {}: {} of {} cells compared", since, step.compared, step.cells);
-  if (step.other_samples > 0)
-    text += text.empty() ? fmt::format("nothing changed since {} but samples_per_ray, in {} of {} cells", since,
-                                       step.other_samples, step.cells)
-                         : fmt::format("; other samples_per_ray in {}", step.other_samples);
+  const auto [samples, cells] = other_samples(step);
+  if (cells > 0)
+    text += text.empty() ? fmt::format("nothing changed since {} but {}, in {} of {} cells", since, samples, cells, step.cells)
+                         : fmt::format("; other {} in {}", samples, cells);
   const auto verdicts = std::count_if(step.undecided.begin(), step.undecided.end(),
                                       [](const CellChange& one) { return one.change == Change::verdict; });
   if (verdicts == 0) return text;
   return text + fmt::format("; {} verdict{}, which {}", verdicts, verdicts == 1 ? " differs" : "s differ",
-                            step.other_samples > 0 ? "chance or other samples can do" : "may be chance");
+                            cells > 0 ? "chance or other samples can do" : "may be chance");
 }
 
 std::string history_text(const History& history, std::size_t width) {
