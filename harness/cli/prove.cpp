@@ -64,7 +64,7 @@ ExitCode run_battery(const ProveCommand& command, const Battery& battery, const 
     progress->cell_done(*record, done, total);
   };
   observer.progress = [&](const CellRecord& record, double fraction) { progress->cell_progress(record, fraction); };
-  observer.timing = [](double) {};
+  observer.timing = [](double, std::size_t) {};
   observer.cell_timed = [](const SharedRecord&) {};
   observer.verdict_share = observer.statistics_share = [](double) {};
   observer.warning = [&](const std::string& message) { progress->warning(message); };

@@ -229,7 +229,7 @@ RunObserver observer_of(Journal* journal, Progress& progress, RunContext& contex
     progress.cell_done(*record, done, total);
   };
   observer.progress = [&progress](const CellRecord& record, double fraction) { progress.cell_progress(record, fraction); };
-  observer.timing = [&progress](double fraction) { progress.timing(fraction); };
+  observer.timing = [&progress](double fraction, std::size_t cells) { progress.timing(fraction, cells); };
   observer.cell_timed = [journal](const SharedRecord& record) {
     if (journal) journal->append(*record);
   };

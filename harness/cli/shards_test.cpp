@@ -63,6 +63,20 @@ TEST_F(Shards, ShareLargeCellsAndMergeToTheWholeRun) {
   EXPECT_EQ(run("check m.json"), run("check whole.json"));
 }
 
+TEST_F(Shards, CountTheCellsThatTheyTime) {
+  std::size_t untimed = 0;
+  for (int k = 1; k <= 3; ++k) {
+    ASSERT_EQ(run(fmt::format("run c.json --shard {}/3", k)), 0) << read("err");
+    const RunRecord part = results(fmt::format("c.{}-of-3.results.json", k));
+    const auto timed =
+        std::count_if(part.cells.begin(), part.cells.end(), [](const CellRecord& cell) { return cell.time.has_value(); });
+    untimed += part.cells.size() - static_cast<std::size_t>(timed);
+    if (timed == 0) continue;
+    EXPECT_NE(read("err").find(fmt::format("timing {}/{}\n", timed, timed)), std::string::npos) << read("err");
+  }
+  EXPECT_GT(untimed, 0u) << "no shard draws a part of a cell that another one times";
+}
+
 TEST_F(Shards, AKilledShardKeepsItsParts) {
   run_shards();
   const RunRecord first = results("c.1-of-3.results.json");

@@ -48,8 +48,8 @@ class FinishedCells {
     keeps.progress = [this, &observer](const CellRecord& record, double fraction) {
       if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) observer.progress(record, fraction);
     };
-    keeps.timing = [this, &observer](double fraction) {
-      if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) observer.timing(fraction);
+    keeps.timing = [this, &observer](double fraction, std::size_t cells) {
+      if (const std::unique_lock lock(mutex_, std::try_to_lock); lock) observer.timing(fraction, cells);
     };
     keeps.warning = [this, &observer](const std::string& message) {
       const std::lock_guard lock(mutex_);

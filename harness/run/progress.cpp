@@ -60,10 +60,10 @@ void Progress::cell_done(const CellRecord& record, std::size_t done, std::size_t
            record.reason.empty() ? "" : " (" + record.reason + ")");
 }
 
-void Progress::timing(double fraction) {
+void Progress::timing(double fraction, std::size_t cells) {
   // Repetitions of all cells are interleaved: so many cells' worth of them is done.
-  const auto timed = static_cast<std::size_t>(fraction * static_cast<double>(total_));
-  const std::string text = fmt::format("timing {}/{}", timed, total_);
+  const auto timed = static_cast<std::size_t>(fraction * static_cast<double>(cells));
+  const std::string text = fmt::format("timing {}/{}", timed, cells);
   if (terminal_) {
     draw(static_cast<double>(total_), text);
   } else if (timed > timed_) {

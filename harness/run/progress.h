@@ -8,8 +8,8 @@
 
 namespace nullmark {
 
-/// Shows the progress of a run on stderr: a bar on a terminal (coloured unless NO_COLOR is set), otherwise one line per cell and one
-/// after 30 s of silence, or nothing.
+/// Shows the progress of a run on stderr: a bar on a terminal (coloured unless NO_COLOR is set), otherwise one line per cell and
+/// one after 30 s of silence, or nothing.
 class Progress {
  public:
   enum class Lines { each_cell, none };
@@ -21,7 +21,7 @@ class Progress {
 
   void cell_progress(const CellRecord& record, double fraction);
   void cell_done(const CellRecord& record, std::size_t done, std::size_t total);
-  void timing(double fraction);
+  void timing(double fraction, std::size_t cells);
   void warning(const std::string& message);
 
  private:

@@ -128,7 +128,7 @@ void time_records(const std::vector<const PreparedCell*>& cells, const TimingPla
   std::vector<TimedCell> timed;
   timed.reserve(cells.size());
   for (const PreparedCell* prepared : cells) timed.push_back({prepared->cell, prepared->scene.get(), prepared->kernel.get()});
-  const auto times = time_cells(timed, plan, stop, [&](double fraction) { observer.timing(fraction); });
+  const auto times = time_cells(timed, plan, stop, [&](double fraction) { observer.timing(fraction, timed.size()); });
   for (std::size_t i = 0; i < times.size(); ++i) {
     if (!times[i]) continue;
     // Others keep the record without a time, so the one with it is another.

@@ -50,7 +50,7 @@ struct RunObserver {
   std::function<void(const SharedRecord&, std::size_t done, std::size_t total)> cell_done = [](const SharedRecord&, std::size_t,
                                                                                                std::size_t) {};
   std::function<void(const CellRecord&, double fraction)> progress = [](const CellRecord&, double) {};
-  std::function<void(double fraction)> timing = [](double) {};
+  std::function<void(double fraction, std::size_t cells)> timing = [](double, std::size_t) {};
   std::function<void(const SharedRecord&)> cell_timed = [](const SharedRecord&) {};
   /// No cell waits that `cell_done` or `cell_timed` has yet to be called for.
   std::function<void()> settled = [] {};
