@@ -45,6 +45,45 @@ std::array<std::string, 3> selection(const RunRecord& run) {
   return {text("filter"), text("covering"), text("selected")};
 }
 
+/// A value of a configuration, cut where it is long.
+std::string value_shown(const Json* value) {
+  constexpr std::size_t kMost = 60;
+  if (!value) return "nothing";
+  const std::string text = value->dump();
+  return text.size() <= kMost ? text : text.substr(0, kMost - 3) + "...";
+}
+
+/// The first place at which two documents differ, as a JSON pointer with both values; nothing where they are equal.
+struct Difference {
+  std::string pointer;
+  const Json *a, *b;
+};
+std::optional<Difference> first_difference(const Json& a, const Json& b, const std::string& pointer) {
+  if (a == b) return std::nullopt;
+  if (a.is_array() && b.is_array() && a.size() == b.size())
+    for (std::size_t i = 0; i < a.size(); ++i)
+      if (auto found = first_difference(a[i], b[i], fmt::format("{}/{}", pointer, i))) return found;
+  if (a.is_object() && b.is_object()) {
+    for (const auto& [key, value] : a.items()) {
+      if (!b.contains(key)) return Difference{pointer + "/" + key, &value, nullptr};
+      if (auto found = first_difference(value, b[key], pointer + "/" + key)) return found;
+    }
+    for (const auto& [key, value] : b.items())
+      if (!a.contains(key)) return Difference{pointer + "/" + key, nullptr, &value};
+  }
+  return Difference{pointer, &a, &b};
+}
+
+/// "/config/seed: found 2, and 1 in a.json".
+std::string config_difference(const std::string& text, const std::string& expected, const std::string& where) {
+  const Json a = known_json(text), b = known_json(expected);
+  const auto found = first_difference(a, b, "/config");
+  // Equal values in another order.
+  if (!found)
+    return fmt::format("/config: found the configuration {}, and {} in {}", config_hash(text), config_hash(expected), where);
+  return fmt::format("{}: found {}, and {} in {}", found->pointer, value_shown(found->a), value_shown(found->b), where);
+}
+
 struct Found {
   const CellRecord* record;
   std::size_t part;
@@ -56,8 +95,8 @@ std::map<std::string, Found> found_cells(const std::vector<RunRecord>& parts, co
   std::map<std::string, Found> cells;
   for (std::size_t part = 0; part < parts.size(); ++part) {
     if (parts[part].config_text != parts[0].config_text)
-      throw InputError(fmt::format("{}: /config: found the configuration {}; expected that of {}, {}", names[part],
-                                   config_hash(parts[part].config_text), names[0], config_hash(parts[0].config_text)));
+      throw InputError(fmt::format("{}: {}; expected results of one configuration and seed", names[part],
+                                   config_difference(parts[part].config_text, parts[0].config_text, names[0])));
     for (const CellRecord& record : parts[part].cells) {
       const auto [at, added] = cells.emplace(record.cell.name, Found{&record, part});
       if (!record.drawn_parts.empty()) at->second.shares.emplace_back(&record, part);

@@ -1,5 +1,6 @@
 #include "harness/run/merge.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "harness/io/json_input.h"
@@ -56,7 +57,38 @@ TEST(Merge, RefusesAnotherConfiguration) {
   const RunRecord run = example_results();
   RunRecord other = run;
   other.config_text = "{}";
-  EXPECT_EQ(error_of({run, other}).substr(0, 42), "b.json: /config: found the configuration 0");
+  EXPECT_EQ(error_of({run, other}).find("b.json: /config/"), 0u) << error_of({run, other});
+}
+
+TEST(Merge, NamesWhatDiffersInAnotherConfiguration) {
+  RunRecord run = example_results(), other = run;
+  const auto refusal = [&](const char* mine, const char* others) {
+    run.config_text = mine;
+    other.config_text = others;
+    return error_of({run, other});
+  };
+  const std::string expected = " in a.json; expected results of one configuration and seed";
+  EXPECT_EQ(refusal(R"({"seed":1})", R"({"seed":2})"), "b.json: /config/seed: found 2, and 1" + expected);
+  EXPECT_EQ(refusal(R"({"experiments":[{"include":[{"samples_per_ray":64}]}]})",
+                    R"({"experiments":[{"include":[{"samples_per_ray":128}]}]})"),
+            "b.json: /config/experiments/0/include/0/samples_per_ray: found 128, and 64" + expected);
+  EXPECT_EQ(refusal(R"({"a":1,"b":"x"})", R"({"a":1})"), "b.json: /config/b: found nothing, and \"x\"" + expected);
+}
+
+TEST(Merge, KeepsTheProvenanceOfResultsThatWereMergedBefore) {
+  const RunRecord run = example_results();
+  std::vector<RunRecord> parts;
+  for (std::size_t i = 0; i < 3; ++i) {
+    parts.push_back(part_of(run, {i}));
+    parts[i].provenance["command_line"] = fmt::format(R"(["nullmark","run","c.json","--shard","{}/3"])", i + 1);
+  }
+  const RunRecord two = merge_results({parts[0], parts[1]}, {"a.json", "b.json"});
+  const Json told = Json::parse(merge_results({two, parts[2]}, {"ab.json", "c.json"}).provenance.at("parts"));
+  ASSERT_EQ(told.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(told[i]["command_line"][4], fmt::format("{}/3", i + 1));
+    EXPECT_FALSE(told[i].contains("parts"));
+  }
 }
 
 }  // namespace

@@ -282,7 +282,7 @@ TEST(SplitCells, PartsMayOverlap) {
 
 TEST(SplitCells, PartsOfAnotherSeedAreRefused) {
   const Plan other = split_plan(kExamples[0].experiment, 2);
-  EXPECT_NE(refusal({shard(grey(), 0, 2), shard(other, 1, 2)}).find("/config: found the configuration"), std::string::npos);
+  EXPECT_NE(refusal({shard(grey(), 0, 2), shard(other, 1, 2)}).find("/seed: found 2, and 1 in 1.json;"), std::string::npos);
 }
 
 /// Any costs are dealt evenly: each cell once, or each of its parts once, to different shards.
