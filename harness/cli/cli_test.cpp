@@ -171,15 +171,19 @@ TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
   write("page.html", "<!doctype html>");
   write("other.json", "{\"a\": 1}");
   const std::vector<std::pair<const char*, const char*>> cases = {
-      {"check nowhere.json", "nowhere.json: no such file"},
+      {"check nowhere.json", "nowhere.json: no such file; `nullmark run CONFIG -o nowhere.json` writes it"},
+      {"merge r.json nowhere.json -o m.json", "nowhere.json: no such file; `nullmark run"},
+      {"replay nowhere.json cell", "nowhere.json: no such file; `nullmark run"},
+      {"report nowhere.json -o r.html", "nowhere.json: no such file; `nullmark run"},
       {"run nowhere.json", "nowhere.json: no such file"},
       {"check folder", "folder: is a folder"},
       {"check c.json", "c.json: is a configuration; `nullmark run` it first"},
       {"run r.json", "r.json: is a results file; nullmark check, compare and report read it"},
       {"check other.json", "is not a results file of nullmark"},
       {"check page.html", "is not a results file of nullmark"},
-      {"check cut.json", "ends in the middle"},
-      {"check empty.json", "is empty"},
+      {"check cut.json",
+       "ends in the middle; expected the whole of a JSON file; copy the results again, or run their configuration"},
+      {"check empty.json", "is empty; expected JSON; copy the results again"},
       {"list", "expected one of estimators, media"},
       {"run c.json --thread 2", "unknown option \"--thread\"; did you mean \"--threads\"?"},
       {"run c.json --thread=2", "did you mean \"--threads\"?"},

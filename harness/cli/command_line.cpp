@@ -46,7 +46,7 @@ void deliver(const std::string& text, const std::string& output) {
 std::vector<RunRecord> load_all(const std::vector<std::string>& files) {
   std::vector<RunRecord> runs;
   runs.reserve(files.size());
-  for (const std::string& file : files) runs.push_back(read_results(read_file(file), file));
+  for (const std::string& file : files) runs.push_back(read_results_file(file));
   return runs;
 }
 

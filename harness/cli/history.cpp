@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "harness/cli/commands.h"
-#include "harness/io/file_io.h"
 #include "harness/io/fitted.h"
 #include "harness/io/json_input.h"
 #include "harness/io/notice.h"
@@ -17,7 +16,7 @@ ExitCode history_command(const HistoryCommand& command) {
   if (command.results.size() < 2)
     throw InputError(command.results.at(0) + ": is alone; expected two results or more of one configuration");
   std::vector<RunRecord> runs;
-  for (const std::string& file : command.results) runs.push_back(read_results(read_file(file), file));
+  for (const std::string& file : command.results) runs.push_back(read_results_file(file));
   const std::vector<TimedBlock> blocks = command.blocks.empty() ? std::vector<TimedBlock>() : read_blocks(command.blocks);
   const History history = history_of(std::move(runs), command.results, blocks);
   if (!history.steps.empty() && command.json)

@@ -7,7 +7,6 @@
 #include <string_view>
 
 #include "harness/cli/commands.h"
-#include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
 #include "harness/io/notice.h"
 #include "harness/io/outputs.h"
@@ -52,7 +51,7 @@ ExitCode merge_command(const MergeCommand& command) {
   refuse_overwriting(command.parts, {command.output});
   expect_new(command.output, command.force, kResultsBeginning);
   std::vector<RunRecord> parts;
-  for (const std::string& file : command.parts) parts.push_back(read_results(read_file(file), file));
+  for (const std::string& file : command.parts) parts.push_back(read_results_file(file));
   tell_missing(parts);
   RunRecord merged = merge_results(parts, command.parts, builds_of(command.builds));
   std::vector<RunRecord>().swap(parts);

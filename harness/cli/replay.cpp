@@ -7,7 +7,6 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/process.h"
 #include "harness/foreign/consent.h"
-#include "harness/io/file_io.h"
 #include "harness/io/notice.h"
 #include "harness/io/results_json.h"
 
@@ -30,7 +29,7 @@ ExitCode replay_command(const ReplayCommand& command) {
   take_consent(command.allow_foreign);
   const SampleChoice choice{index_of(command.ray, "--ray"), index_of(command.sample, "--sample")};
   expect_threads(0);
-  const RunRecord run = read_results(read_file(command.results), command.results);
+  const RunRecord run = read_results_file(command.results);
   const Replay replay = replay_sample(run, command.results, command.cell, choice);
   if (command.json)
     fmt::print("{}\n", replay_json(replay).dump(2));

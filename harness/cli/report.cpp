@@ -19,7 +19,7 @@ ExitCode report_command(const ReportCommand& command) {
   refuse_overwriting_others(command.results, {{command.output, page_beginning()}, {command.markdown, "### nullmark compare"}});
   if (!command.figures.empty()) expect_figures_possible(command.figures);
   std::vector<RunRecord> runs;
-  for (const std::string& file : command.results) runs.push_back(read_results(read_file(file), file));
+  for (const std::string& file : command.results) runs.push_back(read_results_file(file));
   std::string words = program_name() + " report";
   for (const std::string& file : command.results) words += " " + shell_word(file);
   const ReportData data = report_data(runs, command.results, command.baseline, words + " -o " + shell_word(command.output));

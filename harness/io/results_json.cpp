@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <set>
 
 #include "harness/io/claims_json.h"
@@ -28,6 +29,15 @@ class SharedSpecs {
   Distinct distinct_;  ///< by labels as the file has them
   std::vector<Shared<Spec>> list_;
 };
+
+/// The JSON of a results file.  Throws InputError, with a remedy, where it is damaged.
+Json results_json(const std::string& text, const std::string& file) {
+  try {
+    return parse_json(text, file);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}; copy the results again, or run their configuration again", error.what()));
+  }
+}
 
 }  // namespace
 
@@ -68,11 +78,18 @@ std::string statistics_text(const RunRecord& run) {
   return text;
 }
 
+RunRecord read_results_file(const std::string& file) {
+  std::error_code error;
+  if (std::filesystem::status(file, error).type() == std::filesystem::file_type::not_found)
+    throw InputError(fmt::format("{}: no such file; `nullmark run CONFIG -o {}` writes it", file, file));
+  return read_results(read_file(file), file);
+}
+
 RunRecord read_results(const std::string& text, const std::string& file) {
   const auto no_results = [&] { return InputError(file + ": is not a results file of nullmark; `nullmark run` writes them"); };
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first != std::string::npos && text[first] != '{') throw no_results();
-  const Json json = parse_json(text, file);
+  const Json json = results_json(text, file);
   const JsonNode top(json, file);
   if (json.contains("experiments")) throw InputError(file + ": is a configuration; `nullmark run` it first");
   if (json.contains("nullmark_schema"))

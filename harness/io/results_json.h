@@ -29,6 +29,7 @@ std::string results_text(const RunRecord& run);
 
 /// Reads files of the same major schema number; ignores unknown keys.  Throws InputError.
 RunRecord read_results(const std::string& text, const std::string& file);
+RunRecord read_results_file(const std::string& file);
 
 /// Everything that the seed determines, one cell per line, without times, provenance and file names.  Equal texts mean
 /// bit-identical statistics.
