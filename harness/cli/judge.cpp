@@ -49,7 +49,7 @@ ExitCode tell_verdict(const JudgeCommand& command, const Plan& plan, std::vector
   context.selected = 1;
   RunRecord run = make_run_record(plan, std::move(cells), context);
   const Summary summary = summarise(run);
-  tell("{}", summary_text(run, summary));
+  tell("{}", judgement_text(run, summary));
   if (summary.exit == ExitCode::inconclusive) tell("{}\n", advice(command, samples));
   if (!command.output.empty()) write_results(run, command.output);
   return summary.exit;

@@ -180,6 +180,14 @@ std::string summary_text(const RunRecord& run, const Summary& summary, bool all,
   return text;
 }
 
+std::string judgement_text(const RunRecord& run, const Summary& summary) {
+  std::string text;
+  for (const CellRecord& record : run.cells) text += cell_line(record);
+  text += families(run) + "\n";
+  for (const std::string& line : remarks_of(run, summary)) text += line + "\n";
+  return text;
+}
+
 std::string summary_markdown(const RunRecord& run, const Summary& summary, const std::string& file) {
   std::string text = fmt::format("### nullmark check: {}\n\n{}; {}.\n", markdown_cell(run.name), counts(run, summary),
                                  markdown_cell(families(run)));

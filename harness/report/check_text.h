@@ -11,7 +11,10 @@ namespace nullmark {
 std::string summary_text(const RunRecord& run, const Summary& summary, bool all = true,
                          const std::string& command = "nullmark check --all");
 
-/// The same for a pull request.
+/// For the terminal, of results of one cell: its verdict with its reason or what it proves, then the rest as above.
+std::string judgement_text(const RunRecord& run, const Summary& summary);
+
+/// The same as `summary_text` for a pull request.
 std::string summary_markdown(const RunRecord& run, const Summary& summary, const std::string& file);
 
 }  // namespace nullmark

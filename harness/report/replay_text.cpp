@@ -108,12 +108,13 @@ Json replay_json(const Replay& replay) {
 }
 
 std::string replay_text(const Replay& replay) {
-  std::string text =
-      fmt::format("{}, ray {}, sample {}\nfrom {} along {}, distances {:.9g} to {:.9g}\n", replay.cell, replay.ray, replay.sample,
-                  point(replay.world.origin), point(replay.world.direction), replay.world.begin, replay.world.end);
+  std::string text;
   for (std::size_t o = 0; o < replay.values.size(); ++o)
     text += fmt::format("{} {:.9g}{}\n", replay.outputs[o], replay.values[o],
                         replay.targets[o] ? fmt::format(", expected {:.9g}", *replay.targets[o]) : "");
+  text +=
+      fmt::format("{}, ray {}, sample {}\nfrom {} along {}, distances {:.9g} to {:.9g}\n", replay.cell, replay.ray, replay.sample,
+                  point(replay.world.origin), point(replay.world.direction), replay.world.begin, replay.world.end);
   text += fmt::format("{} lookups, {} random numbers\n\n", replay.lookups, replay.draws.size());
   if (replay.walk.steps.empty() && replay.lookups > 0) return text + fmt::format("random numbers {}\n", words(replay.draws));
   return text + steps_text(replay);
