@@ -109,7 +109,8 @@ Json table_json(const Table& table, const CellsByName& cells, const Places& plac
     if (theory) add(row.theory_of ? row_value(cells, table, row, *row.theory_of, metric_theory) : std::nullopt, nullptr);
     rows.push_back({{"label", row.label}, {"values", std::move(values)}, {"cells", std::move(of_cells)}, {"note", row.note}});
   }
-  return {{"title", table.title}, {"metric", table.metric}, {"columns", columns}, {"rows", std::move(rows)}};
+  return {
+      {"title", table.title}, {"metric", table.metric}, {"columns", columns}, {"given", given.size()}, {"rows", std::move(rows)}};
 }
 
 Json claim_json(const ClaimFinding& finding, const CellsByName& cells, const Places& places) {

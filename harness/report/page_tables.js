@@ -39,10 +39,15 @@ function tableHead(table, pictured) {
   return element("thead", {}, tableRow(top), pictured.length > 0 ? tableRow(kinds) : null);
 }
 
-function tableValue(row, column) {
+/** A number that the configuration gives, as it has it: a published one keeps its digits. */
+function formatGiven(x) {
+  return isNumber(x) ? withMinusSign(String(x)) : unknown;
+}
+
+function tableValue(table, row, column) {
   const place = row.cells[column];
   const cell = place === null ? null : report.cells[place];
-  const value = element("td", { className: "numeric" }, numberSpan(row.values[column], formatNumber, { key: "table", column: String(column) }));
+  const value = element("td", { className: "numeric" }, numberSpan(row.values[column], column < table.given ? formatGiven : formatNumber, { key: "table", column: String(column) }));
   if (cell && cell.estimator !== cell.type) value.title = cell.estimator;
   return value;
 }
@@ -70,7 +75,7 @@ function rowOfTable(table, row, index, pictured, ranges) {
     : pictured.length > 0 ? [element("td", { colSpan: 1 + pictured.length }, note ?? "")] : [];
   const cells = [
     element("th", { scope: "row" }, withPageNumbers(row.label), hasPictures || pictured.length === 0 ? note : null),
-    ...table.columns.map((_, column) => tableValue(row, column)),
+    ...table.columns.map((_, column) => tableValue(table, row, column)),
     ...pictures,
   ];
   const made = tableRow(cells);

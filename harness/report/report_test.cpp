@@ -43,6 +43,7 @@ TEST(Report, ShowsTheNumbersOfTheResults) {
   ASSERT_EQ(data["tables"].size(), 1u);
   EXPECT_EQ(data["tables"][0]["columns"], (std::vector<std::string>{"paper", "here", "theory"}));
   const Json& row = data["tables"][0]["rows"][0];
+  EXPECT_EQ(data["tables"][0]["given"], 1);
   EXPECT_EQ(row["values"][0], 0.1);
   EXPECT_EQ(row["values"][1].get<Real>(), *run.cells[0].channel[0].rmse);
   EXPECT_EQ(row["cells"][1], 0);

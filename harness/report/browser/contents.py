@@ -39,6 +39,9 @@ class ContentsTest(PageTest):
                 for heading, number in self.expected_of_row(table, row, cells).items():
                     self.assertEqual(by_heading.get(heading), number, f"{table['title']}: {row['label']}, {heading}")
                     compared += 1
+                texts = self.js(f"""return [...document.querySelectorAll("[data-table='{index}'] [data-row='{at}'] [data-key=table]")].map((one) => one.textContent)""")
+                for heading, number in row.get("given", {}).items():
+                    self.assertEqual(dict(zip(heads, texts))[heading], str(number))  # as the configuration has it
         self.detail = f"{compared} numbers of {len(TABLES)} tables"
 
     @staticmethod
