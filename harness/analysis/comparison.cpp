@@ -80,27 +80,40 @@ bool is_unbiased_estimator(const RankedCell& ranked) {
   return ranked.record->claims == "unbiased" && stands_unbiased(*ranked.record);
 }
 
+/// Several results of one tracker are no rivals: the times of single runs have no verdict, and other samples make no other
+/// tracker.
+bool are_rivals(const RankedCell& a, const RankedCell& b) { return a.tracker != b.tracker; }
+
+/// How many other trackers are proven faster in all of their results that have a time.
+std::size_t proven_faster(const std::vector<RankedCell>& cells, const RankedCell& than) {
+  std::map<std::string, bool> faster;
+  for (const RankedCell& other : cells) {
+    if (!has_time(other) || !are_rivals(other, than)) continue;
+    const bool proven = quotient(*than.seconds[0], *other.seconds[0]).low > 1;
+    const auto [at, first] = faster.try_emplace(other.tracker, proven);
+    if (!first) at->second = at->second && proven;
+  }
+  return static_cast<std::size_t>(std::count_if(faster.begin(), faster.end(), [](const auto& one) { return one.second; }));
+}
+
 void rank(std::vector<RankedCell>& cells) {
   const auto key = [](const RankedCell& ranked) { return has_time(ranked) ? ranked.seconds[0]->value : kInfinity; };
   std::stable_sort(cells.begin(), cells.end(), [&](const RankedCell& a, const RankedCell& b) { return key(a) < key(b); });
-  for (RankedCell& ranked : cells) {
-    if (!has_time(ranked)) continue;
-    ranked.rank = 1 + std::count_if(cells.begin(), cells.end(), [&](const RankedCell& other) {
-                    return has_time(other) && quotient(*ranked.seconds[0], *other.seconds[0]).low > 1;
-                  });
-  }
+  for (RankedCell& ranked : cells)
+    if (has_time(ranked)) ranked.rank = 1 + proven_faster(cells, ranked);
   const auto place = [](const RankedCell& ranked) { return ranked.rank.value_or(std::numeric_limits<std::size_t>::max()); };
   std::stable_sort(cells.begin(), cells.end(), [&](const RankedCell& a, const RankedCell& b) { return place(a) < place(b); });
   for (RankedCell& ranked : cells)
-    ranked.tied = ranked.rank && std::count_if(cells.begin(), cells.end(),
-                                               [&](const RankedCell& other) { return other.rank == ranked.rank; }) > 1;
+    ranked.tied = ranked.rank && std::any_of(cells.begin(), cells.end(), [&](const RankedCell& other) {
+                    return are_rivals(other, ranked) && other.rank == ranked.rank;
+                  });
 }
 
 void mark_pareto(std::vector<RankedCell>& cells) {
   for (RankedCell& one : cells) {
     if (!one.cost || !one.cost->ns_per_sample) continue;
     const auto beats = [&](const RankedCell& other) {
-      if (!other.cost || !other.cost->ns_per_sample) return false;
+      if (!are_rivals(one, other) || !other.cost || !other.cost->ns_per_sample) return false;
       const Real variance = one.cost->variance.value - other.cost->variance.value;
       const Real time = one.cost->ns_per_sample->value - other.cost->ns_per_sample->value;
       return variance >= 0 && time >= 0 && (variance > 0 || time > 0);
@@ -240,8 +253,9 @@ void decide(Comparison& comparison, const std::vector<RunRecord>& runs, const st
     if (ranked.cost && ranked.cost->floor && comparison.best_unbiased)
       ranked.break_even = break_even(*ranked.cost, *cells[*comparison.best_unbiased].cost);
     if (!comparison.baseline) continue;
-    if (has_time(ranked) && has_time(*base))
-      ranked.relative = i == *comparison.baseline ? exactly(1) : quotient(*ranked.seconds[0], *base->seconds[0]);
+    if (i == *comparison.baseline && has_time(ranked)) ranked.relative = exactly(1);
+    if (are_rivals(ranked, *base) && has_time(ranked) && has_time(*base))
+      ranked.relative = quotient(*ranked.seconds[0], *base->seconds[0]);
     if (i != *comparison.baseline) pair_up(comparison, i, *comparison.baseline);
   }
 }
@@ -313,7 +327,7 @@ std::vector<Comparison> comparisons(const std::vector<RunRecord>& runs, const st
       RankedCell ranked;
       ranked.run = run;
       ranked.record = &record;
-      ranked.label = tracker_label(record.cell);
+      ranked.tracker = ranked.label = tracker_label(record.cell);
       ranked.cost = cost_of(record);
       for (const Real target : kTargets) {
         ranked.seconds.push_back(ranked.cost ? seconds_to(*ranked.cost, target) : std::nullopt);

@@ -16,18 +16,19 @@ inline constexpr Real kTargets[] = {0.01, 0.001};
 struct RankedCell {
   std::size_t run = 0;  ///< index of the results that hold the cell
   const CellRecord* record = nullptr;
-  std::string label;  ///< the tracker, with whatever distinguishes it from others of the scene
+  std::string tracker;  ///< with its parameters; results of the same tracker are no rivals
+  std::string label;    ///< the tracker, with whatever distinguishes it from others of the scene
   std::optional<Cost> cost;
   std::vector<std::optional<Interval>> seconds;  ///< to each of kTargets
   std::vector<bool> amortised;                   ///< for each of kTargets: see is_amortised
   /// Relative bias that may be there unseen: what a PASS does not exclude, infinite without one, 0 where a floor is measured.
   Real possible_bias = 0;
-  /// 1 + number of cells proven faster to the first target, that is with a 95 % interval of the ratio of times above 1.  Equal
-  /// ranks are ties.  Absent if no time is known or the target is out of reach.
+  /// 1 + number of other trackers proven faster to the first target in all of their results, that is with a 95 % interval of the
+  /// ratio of times above 1.  Equal ranks are ties.  Absent if no time is known or the target is out of reach.
   std::optional<std::size_t> rank;
-  bool tied = false;                    ///< another cell has the same rank
-  bool pareto = false;                  ///< no other cell has less variance and less time per sample
-  std::optional<Interval> relative;     ///< seconds to the first target divided by those of the baseline
+  bool tied = false;                    ///< a cell of another tracker has the same rank
+  bool pareto = false;                  ///< no cell of another tracker has less variance and less time per sample
+  std::optional<Interval> relative;     ///< seconds to the first target divided by those of the baseline, if of another tracker
   std::optional<BreakEven> break_even;  ///< for cells with a floor, against Comparison::best_unbiased
 };
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "harness/analysis/comparison_test.h"
 #include "harness/io/json_input.h"
@@ -172,6 +173,33 @@ TEST(Comparison, TheSameTrackerTwiceIsToldApart) {
   EXPECT_EQ(labels, (std::set<std::string>{"ratio/seed:1", "ratio/seed:2", "delta"}));
 }
 
+/// Of one tracker's results, and of results of others between them.
+TEST(Comparison, ResultsOfOneTrackerAreNoRivals) {
+  std::vector<RunRecord> runs(2);
+  runs[0].cells = {cell("ratio", 0.04, 10), cell("delta", 0.05, 15), cell("slow", 0.06, 40)};
+  runs[1].cells = {cell("ratio", 0.04, 20)};
+  runs[1].cells[0].cell.samples_per_ray = 1000;
+  const Comparison comparison = comparisons(runs, "").at(0);
+  std::map<std::string, const RankedCell*> by;
+  for (const RankedCell& ranked : comparison.cells) by[ranked.label] = &ranked;
+  EXPECT_EQ(*by.at("ratio/samples:100")->rank, 1u);
+  EXPECT_EQ(*by.at("delta")->rank, 1u);  // one result of ratio is faster, one is slower
+  EXPECT_EQ(*by.at("ratio/samples:1000")->rank, 2u);
+  EXPECT_FALSE(by.at("ratio/samples:1000")->tied);
+  EXPECT_EQ(*by.at("slow")->rank, 3u);  // ratio counts once
+  EXPECT_TRUE(by.at("ratio/samples:1000")->pareto);
+  EXPECT_TRUE(by.at("ratio/samples:100")->relative);
+  EXPECT_FALSE(by.at("ratio/samples:1000")->relative);
+  runs[1].cells[0].time->repetition_ns = runs[0].cells[0].time->repetition_ns;
+  const std::string text = compare_text(runs, "", false);
+  EXPECT_EQ(
+      text.find("Fastest to 1 % error, alone or tied, of 1 scene: ratio in 1 scene; of those that claim to be unbiased: ratio "
+                "in 1 scene\n"),
+      0u)
+      << text;
+  EXPECT_EQ(text.find("1=  "), std::string::npos) << text;
+}
+
 TEST(Comparison, ParetoFrontHoldsWhatNoneBeatsInBoth) {
   const Comparison comparison = only_comparison({cell("a", 1, 10), cell("b", 0.5, 20), cell("dominated", 1, 20)});
   for (const RankedCell& ranked : comparison.cells) EXPECT_EQ(ranked.pareto, ranked.label != "dominated");
@@ -263,6 +291,15 @@ TEST(Compare, TablesTellTiesFloorsAndBreakEven) {
   EXPECT_EQ(text.find("same streams"), std::string::npos) << text;
   EXPECT_NE(compare_markdown(runs, "", false).find("| 2= | ratio |"), std::string::npos) << compare_markdown(runs, "", false);
   EXPECT_TRUE(compare_text({}, "", false).empty());
+}
+
+TEST(Compare, SaysThatTheOthersAreTrackers) {
+  std::vector<RunRecord> runs(1);
+  runs[0].cells = {cell("a"), cell("b"), cell("c"), cell("d")};
+  EXPECT_EQ(compare_text(runs, "", false)
+                .find("Fastest to 1 % error, alone or tied, of 1 scene: a in 1 scene, b in 1 scene and 2 more trackers; "),
+            0u)
+      << compare_text(runs, "", false);
 }
 
 TEST(Compare, ATrackerWhoseVerdictIsFailIsNeverTheBaseline) {

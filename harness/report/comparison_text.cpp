@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "harness/analysis/comparison.h"
 #include "harness/io/text.h"
@@ -169,22 +170,27 @@ std::string seam_lines(const Comparison& comparison) {
   return text;
 }
 
-/// In how many scenes each tracker is among the fastest, the most frequent first: "ratio in 2 scenes, delta in 1 scene".
+/// In how many scenes each tracker is among the fastest, the most frequent first: "ratio in 2 scenes, delta in 1 scene".  Several
+/// results of a tracker count once.
 std::string fastest_counted(const std::vector<Comparison>& all, bool unbiased) {
   constexpr std::size_t kNamed = 2;
   std::vector<std::pair<std::string, std::size_t>> wins;
-  for (const Comparison& comparison : all)
+  for (const Comparison& comparison : all) {
+    std::set<std::string> counted;
     for (const std::size_t i : fastest(comparison, unbiased)) {
-      const std::string& label = comparison.cells[i].label;
-      const auto at = std::find_if(wins.begin(), wins.end(), [&](const auto& win) { return win.first == label; });
-      at == wins.end() ? void(wins.emplace_back(label, 1)) : void(++at->second);
+      const std::string& tracker = comparison.cells[i].tracker;
+      if (!counted.insert(tracker).second) continue;
+      const auto at = std::find_if(wins.begin(), wins.end(), [&](const auto& win) { return win.first == tracker; });
+      at == wins.end() ? void(wins.emplace_back(tracker, 1)) : void(++at->second);
     }
+  }
   std::stable_sort(wins.begin(), wins.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
   std::vector<std::string> named;
   for (std::size_t i = 0; i < std::min(kNamed, wins.size()); ++i)
     named.push_back(fmt::format("{} in {} scene{}", wins[i].first, wins[i].second, wins[i].second == 1 ? "" : "s"));
+  const std::size_t more = wins.size() - named.size();
   return fmt::format("{}{}", fmt::join(named, ", "),
-                     wins.size() > kNamed ? fmt::format(" and {} more", wins.size() - kNamed) : "");
+                     more > 0 ? fmt::format(" and {} more tracker{}", more, more == 1 ? "" : "s") : "");
 }
 
 /// Who is fastest where, in the words of the report's summary.

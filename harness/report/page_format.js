@@ -91,9 +91,11 @@ function plotLines(lines) {
   return lines.map(plotText).join("<br>");
 }
 
-function listed(names, most = 4) {
+/** "a, b and 3 more trackers". */
+function listed(names, most = 4, noun = "") {
   const rest = names.length - most;
-  return names.slice(0, most).join(", ") + (rest > 0 ? ` and ${rest} more` : "");
+  const more = () => (noun === "" ? `${rest} more` : countOf(rest, `more ${noun}`));
+  return names.slice(0, most).join(", ") + (rest > 0 ? ` and ${more()}` : "");
 }
 
 function countOf(number, noun) {

@@ -148,10 +148,13 @@ function matrixAxis(theme, names, angle, every) {
   };
 }
 
-function matrixCaption({ labels, scenes, entries }) {
-  const best = labels.map((label, row) => [label, entries[row].filter(({ relative, cell }) => relative === 1 && standsUnbiased(cell)).length]).sort((a, b) => b[1] - a[1]);
-  const named = best.filter(([, count]) => count > 0).map(([label, count]) => `${label} ${count}`);
-  return `${countOf(labels.length, "estimator")} on ${countOf(scenes.length, "scene")}. Best unbiased of its column, and how often: ${listed(named) || "none"}. ${unprovenHint(entries.flat().map(({ cost }) => cost))}`;
+function matrixCaption({ scenes, entries }) {
+  // Rows of one tracker, such as of several numbers of samples, are no rivals.
+  const trackers = groupedBy(entries.map((line) => line.filter(({ cell }) => cell)), ([{ cell }]) => cell.estimator);
+  const wins = (lines) => new Set(lines.flat().filter(({ relative, cell }) => relative === 1 && standsUnbiased(cell)).map(({ cell }) => cell.scene)).size;
+  const named = [...trackers].map(([tracker, lines]) => [tracker, wins(lines)]).filter(([, count]) => count > 0).sort((a, b) => b[1] - a[1])
+    .map(([tracker, count]) => `${tracker} ${count}`);
+  return `${countOf(trackers.size, "estimator")} on ${countOf(scenes.length, "scene")}. Best unbiased of its column, and how often: ${listed(named, 4, "tracker") || "none"}. ${unprovenHint(entries.flat().map(({ cost }) => cost))}`;
 }
 
 function matrixNumbers({ labels, scenes, entries }) {

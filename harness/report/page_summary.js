@@ -15,11 +15,22 @@ function claimTag(cell) {
   return cell.claims === "unbiased" || cell.claims === "exact" ? null : element("span", { className: "tag" }, cell.claims);
 }
 
+/** Several results of one tracker are no rivals: lists of entries, one for each tracker. */
+function entriesByTracker(entries) {
+  return [...groupedBy(entries, ({ cell }) => report.cells[cell].estimator).values()];
+}
+
+/** Tied trackers with " = " between them, results of one tracker with ", ". */
 function namesAndSeconds(entries) {
-  const names = entries.flatMap((entry, i) => [i > 0 ? " = " : "", markedLabel(entry.label), claimTag(report.cells[entry.cell]) ?? ""]);
-  const times = entries.map((entry) => secondsTo(report.cells[entry.cell], 0));
-  const seconds = times.map((time) => `${formatSeconds(time?.value)}${unprovenMark(time)}`);
-  return [element("span", {}, ...names), seconds.join(" = ")];
+  const joined = (between, lists) => lists.flatMap((list, i) => (i > 0 ? [between, ...list] : list));
+  const nameOf = (entry) => [markedLabel(entry.label), claimTag(report.cells[entry.cell]) ?? ""];
+  const timeOf = (entry) => {
+    const time = secondsTo(report.cells[entry.cell], 0);
+    return `${formatSeconds(time?.value)}${unprovenMark(time)}`;
+  };
+  const trackers = entriesByTracker(entries);
+  const names = joined(" = ", trackers.map((own) => joined(", ", own.map(nameOf))));
+  return [element("span", {}, ...names), trackers.map((own) => own.map(timeOf).join(", ")).join(" = ")];
 }
 
 function winnerRow(scene) {
@@ -28,8 +39,9 @@ function winnerRow(scene) {
 
 function tally(scenes, winners) {
   const wins = new Map();
-  for (const scene of scenes) for (const { label } of winners(scene)) wins.set(label, (wins.get(label) ?? 0) + 1);
-  return listed([...wins].sort((a, b) => b[1] - a[1]).map(([label, count]) => `${label} in ${countOf(count, "scene")}`), 2);
+  for (const scene of scenes)
+    for (const tracker of new Set(winners(scene).map(({ cell }) => report.cells[cell].estimator))) wins.set(tracker, (wins.get(tracker) ?? 0) + 1);
+  return listed([...wins].sort((a, b) => b[1] - a[1]).map(([label, count]) => `${label} in ${countOf(count, "scene")}`), 2, "tracker");
 }
 
 function winnersSentence(scenes) {

@@ -96,15 +96,16 @@ class PlotsTest(PageTest):
             self.skipTest("nothing was timed")
         scenes = self.js("""return report.scenes.filter((scene) => cellsOf(scene).some(reachesTheError) && unbiasedWinnersOf(scene).length > 0).map((scene) => ({
             said: timesCaption(scene), cells: unbiasedWinnersOf(scene).map((entry) => report.cells[entry.cell]),
-            ratio: cellsOf(scene).find((cell) => cell.type === "ratio")?.cost?.seconds[0].value ?? null }))""")
+            ratios: Object.fromEntries(cellsOf(scene).filter((cell) => cell.type === "ratio").map((cell) => [cell.run, cell.cost?.seconds[0].value ?? null])) }))""")
         self.assertTrue(scenes)
         for scene in scenes:
             for cell in scene["cells"]:
                 self.assertIn(cell["label"], scene["said"])
                 self.assertIn(f"; {cell['marked_word']})", scene["said"])
-                told = re.search(re.escape(cell["label"]) + r" \([^;]*, ([\d.e−]+) times the time of ratio;", scene["said"])
-                if scene["ratio"] and cell["type"] != "ratio":
-                    share = cell["cost"]["seconds"][0]["value"] / scene["ratio"]
+                told = re.search(re.escape(cell["label"]) + r" \([^;]*, ([\d.e−]+) times the time of ratio(?:/samples:\d+)?;", scene["said"])
+                ratio = scene["ratios"].get(str(cell["run"]))
+                if ratio and cell["type"] != "ratio":
+                    share = cell["cost"]["seconds"][0]["value"] / ratio
                     self.assertAlmostEqual(float(told[1].replace("−", "-")) / share, 1, delta=0.06)
 
     @once
