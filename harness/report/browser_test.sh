@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # browser_test.sh PROGRAM FOLDER   has PROGRAM report on browser_test.json, on a part of it without timing, on many_cells.json and
-# on a history from which cells went, and a real browser read the pages
+# on a history from which cells went and on results of other samples, and a real browser read the pages
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 program=$1 folder=$2
@@ -21,3 +21,9 @@ sed 's/"optical_depth": \[0.5, 1, 2, 4\]/"optical_depth": [0.5, 1, 2]/' "$here/b
 "$program" run "$folder/fewer_depths.config.json" --no-timing -o "$folder/fewer_depths.json" --force >/dev/null 2>&1
 "$program" report "$folder/all_depths.json" "$folder/fewer_depths.json" -o "$folder/history.html"
 /usr/bin/python3 -B "$here/browser_test.py" "$folder/history.html" "$folder/all_depths.json" "$folder/fewer_depths.json"
+
+sed 's/"samples_per_ray": 256/"samples_per_ray": 1048576/' "$here/browser_test.json" >"$folder/more_samples.config.json"
+"$program" run "$here/browser_test.json" --filter '^depth' -o "$folder/few_samples.json" --force >/dev/null 2>&1
+"$program" run "$folder/more_samples.config.json" --filter '^depth' -o "$folder/more_samples.json" --force >/dev/null 2>&1
+"$program" report "$folder/few_samples.json" "$folder/more_samples.json" -o "$folder/other_samples.html"
+/usr/bin/python3 -B "$here/browser_test.py" "$folder/other_samples.html" "$folder/few_samples.json" "$folder/more_samples.json"

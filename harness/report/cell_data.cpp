@@ -14,6 +14,7 @@
 #include "harness/model/metrics.h"
 #include "harness/model/names.h"
 #include "harness/verdict/cell_word.h"
+#include "harness/verdict/verdict.h"
 
 namespace nullmark {
 
@@ -53,6 +54,7 @@ Json verdict_json_of(const CellRecord& record) {
   }
   return {{"epsilon", number_or_null(epsilon)},
           {"log_e_fail", number_or_null(evidence)},
+          {"excludes", kind_of(record) == Kind::pass ? number_or_null(excluded_bias(verdict)) : Json(nullptr)},
           {"samples_per_ray", verdict.samples_per_ray}};
 }
 

@@ -16,7 +16,7 @@
 namespace nullmark {
 namespace {
 
-/// How many cells of a kind have each mark: " (3 by pilot, 1 own mean)"; empty where none has one.
+/// How many cells of a kind have each mark: " (of them 3 by pilot, 1 own mean)"; empty where none has one.
 std::string marks_among(const RunRecord& run, Kind kind) {
   std::map<Mark, std::size_t> counts;
   for (const CellRecord& record : run.cells)
@@ -24,7 +24,7 @@ std::string marks_among(const RunRecord& run, Kind kind) {
       for (const Mark mark : marks_of(record)) ++counts[mark];
   std::string text;
   for (const auto& [mark, count] : counts) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, mark_name(mark));
-  return text.empty() ? "" : fmt::format(" ({})", text);
+  return text.empty() ? "" : fmt::format(" (of them {})", text);
 }
 
 std::string counts(const RunRecord& run, const Summary& s) {

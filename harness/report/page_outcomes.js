@@ -19,31 +19,51 @@ function cellBadge(cell, more = {}) {
 }
 
 const outcomeMeanings = {
-  PASS: "a bias above epsilon is ruled out",
   FAIL: "bias is proven, or lookups or walks break a law",
   AGREE: "the means of two trackers differ by less than twice epsilon; equal biases would not show",
   DIFFER: "the means of two trackers differ: one of them is biased",
   INCONCLUSIVE: "neither bias nor its absence is proven, though the plan foresaw a decision",
-  "INCONCLUSIVE (as planned)": "the plan said beforehand that no affordable number of samples decides",
 };
 
-function violationsText() {
-  const cells = report.cells.filter((cell) => outcomeOf(cell) === "VIOLATED");
-  const lookups = cells.reduce((sum, cell) => sum + cell.violations, 0);
-  const largest = Math.max(...cells.map((cell) => cell.largest_violation ?? 1));
-  return `needs a majorant that bounds the extinction: ${countOf(lookups, "lookup")} above the bound, largest ratio ${formatNumber(largest, 3)}`;
+const decidedWords = ["PASS", "FAIL", "AGREE", "DIFFER"];
+
+/** Why cells are open as planned, and how many of them another of the given results decides. */
+function plannedText(cells) {
+  const keyOf = (cell) => `${cell.scene} ${cell.name}`;
+  const decided = new Set(report.cells.filter((cell) => decidedWords.includes(outcomeOf(cell))).map(keyOf));
+  const elsewhere = cells.filter((cell) => decided.has(keyOf(cell))).length;
+  const others = elsewhere > 0 ? `; with the samples of another of these results, ${elsewhere} of these cells ${elsewhere === 1 ? "is" : "are"} decided` : "";
+  return `the plan said beforehand that no number of samples that the configuration allows decides${others}`;
 }
 
-function outcomeMeaning(word) {
-  return word === "VIOLATED" ? violationsText() : outcomeMeanings[word] ?? "see the reasons in the table of every cell";
+/** The largest of each: trackers on the same streams see the same places, so a sum would count these twice. */
+function violationsText(cells) {
+  const lookups = Math.max(...cells.map((cell) => cell.violations));
+  const largest = Math.max(...cells.map((cell) => cell.largest_violation ?? 1));
+  return `needs a majorant that bounds the extinction: up to ${countOf(lookups, "lookup")} of a cell above the bound, the extinction at most ${formatNumber(largest, 3)} times the bound`;
+}
+
+/** "a bias above epsilon is ruled out (epsilon 0.37 % to 2 % of the mean)". */
+function passText(cells) {
+  const excluded = cells.map((cell) => cell.verdict?.excludes).filter(isNumber);
+  if (excluded.length === 0) return "a bias above epsilon is ruled out";
+  const shown = (x) => (x < rounding ? "rounding" : formatPercent(x));
+  const [least, most] = [Math.min(...excluded), Math.max(...excluded)].map(shown);
+  return `a bias above epsilon is ruled out (epsilon ${least === most ? most : `${least} to ${most}`} of the mean)`;
+}
+
+function outcomeMeaning(word, cells) {
+  if (word === "PASS") return passText(cells);
+  if (word === "INCONCLUSIVE (as planned)") return plannedText(cells);
+  return word === "VIOLATED" ? violationsText(cells) : outcomeMeanings[word] ?? "see the reasons in the table of every cell";
 }
 
 /** What the marks of some cells mean, with their words; and why cells are not tested. */
 function marksMeaning(cells) {
   const meanings = cellsByWord(cells).flatMap(([word, of]) => {
-    if (word === "not tested") return [`${word}: ${listed([...new Set(of.map((cell) => cell.finding))], 2)}`];
-    const own = of.filter((cell) => markOf(cell) === ownMeanMark);
-    const plain = own.length < of.length ? [`${outcomeMarks[word] ?? ""} ${word}: ${outcomeMeaning(word)}`.trim()] : [];
+    if (word === "not tested") return [`${word}: ${listed([...new Set(of.map((cell) => cell.finding))], 2, "reason")}`];
+    const own = of.filter((cell) => markOf(cell) === ownMeanMark), others = of.filter((cell) => !own.includes(cell));
+    const plain = others.length > 0 ? [`${outcomeMarks[word] ?? ""} ${word}: ${outcomeMeaning(word, others)}`.trim()] : [];
     return own.length > 0 ? [...plain, `${ownMeanMark} PASS (own mean): the mean is the one that the tracker's theory predicts, which may be biased`] : plain;
   });
   return meanings.join("; ");
@@ -51,11 +71,11 @@ function marksMeaning(cells) {
 
 const verdictWords = ["PASS", "FAIL", "AGREE", "DIFFER", "VIOLATED", "INCONCLUSIVE", "INCONCLUSIVE (as planned)", "ERROR", "not run", "not tested"];
 
-/** How many cells of a word have each mark: "(3 by pilot, 1 own mean)". */
+/** How many cells of a word have each mark: "(of them 3 by pilot, 1 own mean)". */
 function marksText(cells) {
   const counts = new Map();
   for (const mark of cells.flatMap((cell) => cell.marks)) counts.set(mark, (counts.get(mark) ?? 0) + 1);
-  return counts.size === 0 ? "" : element("small", {}, `(${[...counts].map(([mark, count]) => `${count} ${mark}`).join(", ")}) `);
+  return counts.size === 0 ? "" : element("small", {}, `(of them ${[...counts].map(([mark, count]) => `${count} ${mark}`).join(", ")}) `);
 }
 
 /** The cells of each word that occurs: [["PASS", [...]], ...]. */

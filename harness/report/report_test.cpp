@@ -57,6 +57,7 @@ TEST(Report, TellsWhichErrorsAreProvenToBeReachable) {
   EXPECT_EQ(data["cells"][0]["cost"]["seconds"][0]["proven"], true);
   EXPECT_EQ(data["cells"][0]["cost"]["seconds"][1]["proven"], false);
   EXPECT_NE(data["scenes"][0]["unproven"].get<std::string>().find("above 0.5 % of the mean"), std::string::npos);
+  EXPECT_NEAR(data["cells"][0]["verdict"]["excludes"].get<Real>(), 0.005, 1e-12);
 }
 
 TEST(Report, TellsOfCellsThatDidNotRun) {

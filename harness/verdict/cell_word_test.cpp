@@ -156,13 +156,14 @@ TEST(Words, AreTheSameInEveryOutput) {
   says(text, passes + ": cell 0: " + proves + "\n");
   says(text, fails + ": cell 1: " + why + "\n");
   says(text,
-       "2 PASS (1 bound not proven), 1 FAIL (1 by pilot), 0 INCONCLUSIVE as planned, 0 INCONCLUSIVE, 0 VIOLATED, 0 errors, "
+       "2 PASS (of them 1 bound not proven), 1 FAIL (of them 1 by pilot), 0 INCONCLUSIVE as planned, 0 INCONCLUSIVE, 0 VIOLATED, "
+       "0 errors, "
        "0 not run, 1 not tested\n");
   EXPECT_EQ(text.find("cell 3"), std::string::npos) << "a PASS without a mark needs no line";
   const std::string markdown = summary_markdown(run, summary, "r.json");
   says(markdown, "| " + passes + " | cell 0 | \\|bias\\| < 2 % of the mean |");
   says(markdown, "| " + fails + " | cell 1 | " + why + " |");
-  says(markdown, "2 PASS (1 bound not proven), 1 FAIL (1 by pilot)");
+  says(markdown, "2 PASS (of them 1 bound not proven), 1 FAIL (of them 1 by pilot)");
   const std::string junit_text = junit(run, "r.json");
   says(junit_text, "<system-out>" + passes + ": |bias| &lt; 2 % of the mean</system-out>");
   says(junit_text, "<failure message=\"" + xml(fails + ": " + why) + "\">");

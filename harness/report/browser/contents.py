@@ -164,6 +164,47 @@ class ContentsTest(PageTest):
         self.detail = f"{history['says']}; {sum(map(len, drawn))} series"
 
     @once
+    def test_2c_violations_are_not_summed_over_trackers(self):
+        said = self.js("return violationsText([{ violations: 5, largest_violation: 1.5 }, { violations: 3, largest_violation: 2 }])")
+        self.assertIn("up to 5 lookups of a cell above the bound", said)
+        self.assertIn("at most 2 times", said)
+
+    @once
+    def test_2d_a_legend_gives_epsilon_and_whose_marks_it_counts(self):
+        said = self.js("return passText([{ verdict: { excludes: 0.0037 } }, { verdict: { excludes: 0.02 } }, { verdict: null }])").replace("\u00a0", " ")
+        self.assertEqual(said, "a bias above epsilon is ruled out (epsilon 0.37 % to 2 % of the mean)")
+        self.assertEqual(self.js("return marksText([{ marks: ['own mean'] }, { marks: [] }]).textContent"), "(of them 1 own mean) ")
+        passed = self.js("return marksMeaning(report.cells.filter((cell) => outcomeOf(cell) === 'PASS' && !cell.marks.includes('own mean')))")
+        if passed:
+            self.assertRegex(passed, r"ruled out \(epsilon ")
+
+    @once
+    def test_2b_results_of_one_tracker_are_no_rivals(self):
+        if len(FILES) < 2 or not timed():
+            self.skipTest("one result, or untimed ones")
+        said = self.js("""return report.scenes.map((scene) => {
+            const ranking = scene.ranking.map((entry) => ({ ...entry, rank: 1, tied: true }));
+            const all = { ...scene, ranking };
+            return { answer: answerOf(all), times: namesAndSeconds(ranking)[1], trackers: new Set(ranking.map(({ cell }) => report.cells[cell].estimator)).size,
+                     unbiased: new Set(ranking.map(({ cell }) => report.cells[cell]).filter((cell) => cell.unbiased).map((cell) => cell.estimator)).size,
+                     count: ranking.length, tally: tally([all], winnersOf) };
+        })""")
+        for one in said:
+            self.assertGreater(one["count"], one["trackers"])
+            self.assertEqual(one["answer"].count(", tied with "), one["unbiased"] - 1)
+            self.assertEqual(one["times"].count(" = "), one["trackers"] - 1)
+            self.assertNotIn("samples:", one["tally"])
+            self.assertNotRegex(one["answer"], r"ratio/samples:\d+ \([^)]*times the time of ratio/")
+        planned = self.js("return plannedText(report.cells.filter((cell) => outcomeOf(cell) === 'INCONCLUSIVE (as planned)'))")
+        words = {}
+        for cell in self.js("return report.cells.map((cell) => [cell.name, outcomeOf(cell)])"):
+            words.setdefault(cell[0], []).append(cell[1])
+        decided = sum("INCONCLUSIVE (as planned)" in own and "PASS" in own for own in words.values())
+        self.assertGreater(decided, 0)
+        self.assertRegex(planned, rf"; with the samples of another of these results, {decided} of these cells (is|are) decided$")
+        self.detail = f"{len(said)} scenes, {decided} cells that other samples decide"
+
+    @once
     def test_2a_the_matrix_counts_every_cell(self):
         wanted = self.js("return report.scenes.length > manyScenes && report.cells.some((cell) => cell.verdict)")
         rows = self.js("""return [...document.querySelectorAll("#outcomes tbody tr")].map((row) =>
