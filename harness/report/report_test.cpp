@@ -6,6 +6,7 @@
 #include "harness/io/packing.h"
 #include "harness/report/data.h"
 #include "harness/report/page.h"
+#include "harness/report/results_tables.h"
 #include "harness/run/image.h"
 #include "harness/testing/page_data.h"
 #include "harness/testing/program.h"
@@ -42,8 +43,8 @@ TEST(Report, ShowsTheNumbersOfTheResults) {
   EXPECT_EQ(data["claims"][1]["required"], true);
   ASSERT_EQ(data["tables"].size(), 1u);
   EXPECT_EQ(data["tables"][0]["columns"], (std::vector<std::string>{"paper", "here", "theory"}));
-  const Json& row = data["tables"][0]["rows"][0];
   EXPECT_EQ(data["tables"][0]["given"], 1);
+  const Json& row = data["tables"][0]["rows"][0];
   EXPECT_EQ(row["values"][0], 0.1);
   EXPECT_EQ(row["values"][1].get<Real>(), *run.cells[0].channel[0].rmse);
   EXPECT_EQ(row["cells"][1], 0);
@@ -56,8 +57,15 @@ TEST(Report, TellsWhichErrorsAreProvenToBeReachable) {
   const Json data = data_of(run);
   EXPECT_EQ(data["cells"][0]["cost"]["seconds"][0]["proven"], true);
   EXPECT_EQ(data["cells"][0]["cost"]["seconds"][1]["proven"], false);
-  EXPECT_NE(data["scenes"][0]["unproven"].get<std::string>().find("above 0.5 % of the mean"), std::string::npos);
   EXPECT_NEAR(data["cells"][0]["verdict"]["excludes"].get<Real>(), 0.005, 1e-12);
+  EXPECT_NE(data["scenes"][0]["unproven"].get<std::string>().find("above 0.5 % of the mean"), std::string::npos);
+}
+
+TEST(Report, TablesSayThatMeasuredSamplesHaveNoTheory) {
+  RunRecord run = example_results();
+  EXPECT_EQ(results_tables(run).find("\n- theory: "), std::string::npos);
+  run.cells[0].cell.measurement.clamp = true;
+  EXPECT_NE(results_tables(run).find("\n- theory: none is known of clamped or quantised samples\n"), std::string::npos);
 }
 
 TEST(Report, TellsOfCellsThatDidNotRun) {

@@ -164,12 +164,13 @@ const std::vector<std::string>& results_columns() {
 std::string results_tables(const RunRecord& run, const TableShape& shape) {
   std::string text = fmt::format("{} cells: {}\n\n", run.cells.size(), verdicts_counted(run));
   std::vector<std::string> left_out;
-  bool marked = false, uncertain = false;
+  bool marked = false, uncertain = false, measured = false;
   for (const auto& [title, records] : grouped(run.cells, heading)) {
     std::vector<Line> lines = {{"estimator"}};
     lines[0].insert(lines[0].end(), results_columns().begin(), results_columns().end());
     for (const CellRecord* record : records) {
       append_lines(*record, lines);
+      measured |= record->status == Status::ok && record->cell.measurement != Measurement{};
       for (const ChannelRecord& channel : record->channel) {
         marked |= heavy_tailed(channel) && channel.variance_theory;
         uncertain |= variance_is_uncertain(*record, channel);
@@ -180,6 +181,7 @@ std::string results_tables(const RunRecord& run, const TableShape& shape) {
   if (marked)
     text += fmt::format("* theory: the relative variance is above {}, too heavy a tail for the sample's own\n\n", kHeavyTail);
   if (uncertain) text += "? too few samples to know this variance: rare samples decide it\n\n";
+  if (measured) text += "- theory: none is known of clamped or quantised samples\n\n";
   for (const auto& [title, lines] : configured_tables(run))
     text += fmt::format("{}\n{}\n", title, fitted(lines, 1, shape.width, left_out));
   return text + left_out_line(left_out);
