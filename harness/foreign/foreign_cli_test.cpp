@@ -105,7 +105,11 @@ TEST_F(ForeignProgram, ProveTriesATrackerOfALibrary) {
   const std::string honest = library(NULLMARK_EXAMPLE_LIBRARY, "ratio"),
                     slip = library(NULLMARK_TRACKERS_LIBRARY, "ratio", R"("parameters":{"fault":"slip"})");
   EXPECT_EQ(run(fmt::format("prove '{}' --quick --allow-foreign", honest)), 0) << read("out") << read("err");
+  const auto first_line = [&] { return read("out").substr(0, read("out").find('\n')); };
+  EXPECT_EQ(first_line().find(fmt::format("estimator {}: ", honest)), 0u) << read("out");
+  EXPECT_NE(first_line().find(" PASS"), std::string::npos) << read("out");
   EXPECT_EQ(run(fmt::format("prove '{}' --quick --allow-foreign", slip)), 3) << read("out") << read("err");
+  EXPECT_NE(first_line().find(" FAIL"), std::string::npos) << read("out");
 }
 
 TEST_F(ForeignProgram, ACrashInsideTheProgramNamesItsCell) {

@@ -61,6 +61,18 @@ TEST(Report, TellsWhichErrorsAreProvenToBeReachable) {
   EXPECT_NE(data["scenes"][0]["unproven"].get<std::string>().find("above 0.5 % of the mean"), std::string::npos);
 }
 
+TEST(Report, TellsHowMergedResultsAreMadeAgain) {
+  RunRecord run = example_results();
+  run.provenance["command_line"] = R"(["/opt/nullmark","run","c.json","--shard","1/2"])";
+  run.provenance["parts"] = R"([{"command_line":["/opt/nullmark","run","c.json","--shard","1/2"]},
+      {"command_line":["/opt/nullmark","run","c.json","--shard","2/2"]},
+      {"command_line":["/opt/nullmark","run","c.json","--shard","1/2"]}])";
+  const std::vector<std::string> expected = {"nullmark run c.json --shard 1/2", "nullmark run c.json --shard 2/2",
+                                             "nullmark merge PART... -o example.json  # the results of the commands above",
+                                             "nullmark check example.json", "nullmark compare example.json"};
+  EXPECT_EQ(data_of(run)["runs"][0]["commands"], Json(expected));
+}
+
 TEST(Report, TablesSayThatMeasuredSamplesHaveNoTheory) {
   RunRecord run = example_results();
   EXPECT_EQ(results_tables(run).find("\n- theory: "), std::string::npos);

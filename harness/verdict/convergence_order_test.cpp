@@ -53,6 +53,17 @@ TEST(Order, ExactPowersAreMeasured) {
   }
 }
 
+TEST(Order, NamesHaveTheParametersOfTheTracker) {
+  std::vector<CellRecord> cells = marches(power(1, 0.01), 1), others = cells;
+  for (CellRecord& record : others)
+    record.cell.estimator.edit([](Component& estimator) { estimator.values["offset"] = std::string("right"); });
+  cells.insert(cells.end(), others.begin(), others.end());
+  const std::vector<OrderFit> fits = fit_orders(cells);
+  ASSERT_EQ(fits.size(), 2u);
+  EXPECT_EQ(fits[0].name.find("ray_marching/offset:left/"), 0u) << fits[0].name;
+  EXPECT_EQ(fits[1].name.find("ray_marching/offset:right/"), 0u) << fits[1].name;
+}
+
 TEST(Order, LessThanClaimedFails) {
   const OrderFit fit = fitted(marches(power(1, 0.01), 2));
   EXPECT_EQ(fit.outcome, Outcome::fail);
