@@ -93,13 +93,13 @@ struct Control {
 
   /// At a distance on a segment; many of both give as many.
   template <class Distance, class Segment>
-  auto at(const Distance& t, const Segment& segment) const {
-    using Result = std::conditional_t<std::is_same_v<Distance, Real>, Value, Distance>;
-    if (!linear && !exponential_profile) return Result(entry(of_segment, segment));
+  auto at(const Distance& t, const Segment& segment) const -> std::remove_cvref_t<decltype(entry(of_segment, segment))> {
+    using Result = std::remove_cvref_t<decltype(entry(of_segment, segment))>;
+    if (!linear && !exponential_profile) return entry(of_segment, segment);
     if constexpr (std::is_same_v<Distance, Real>)
-      return uniform_value<Value>(channels, profile(t));
+      return uniform_value<Result>(channels, profile(t));
     else
-      return profile(t);
+      return Result(profile(t));
   }
 };
 

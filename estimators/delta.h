@@ -1,7 +1,5 @@
 #pragma once
 
-#include <variant>
-
 #include "estimators/estimator.h"
 #include "estimators/theory/survival.h"
 
@@ -50,14 +48,15 @@ struct DeltaTracking {
     }
   }
 
-  struct Separate {
-    int walking = 0;  ///< the channel that walks
-    bool done = false;
-  };
-
-  struct Walk : std::conditional_t<kChromatic, Separate, std::monostate> {
+  struct Grey {
     Value transmittance;
   };
+  struct Chromatic {
+    Value transmittance;
+    int walking = 0;  ///< the channel that walks, where each walks for itself
+    bool done = false;
+  };
+  using Walk = std::conditional_t<kChromatic, Chromatic, Grey>;
 
   static auto done(const Walk& walk) {
     if constexpr (kChromatic)
@@ -67,7 +66,7 @@ struct DeltaTracking {
   }
 
   void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
-    walk = {{}, ray.value(1)};
+    walk = {ray.value(1)};
     if (!ray.per_channel.empty()) flight.start(ray.per_channel[0]);
   }
 

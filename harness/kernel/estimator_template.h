@@ -38,6 +38,10 @@ class EstimatorTemplate final : public EstimatorSource {
       visit_parameters(lanes_, visit);
       visit_parameters(single_, visit);
     }
+    if constexpr (kColoursInLanes) {
+      visit_parameters(three_in_lanes_, visit);
+      visit_parameters(four_in_lanes_, visit);
+    }
   }
   Guarantee claim(Quantity quantity) const override { return grey_.claim(quantity); }
   SampleRange range(int channels) const override {
@@ -65,6 +69,13 @@ class EstimatorTemplate final : public EstimatorSource {
     }
     if (precision == Precision::float32) return nullptr;
     if (channels == 1) return std::make_unique<BlockKernel<Estimator, Real>>(grey_, 1);
+    if constexpr (kColoursInLanes) {
+      constexpr std::size_t kWidth = kNativeLanes<Real>;
+      if (channels == 3 && lanes && shares_walk(3))
+        return std::make_unique<LaneKernel<Estimator, Real, kWidth, 3>>(three_, three_in_lanes_);
+      if (channels == 4 && lanes && shares_walk(4))
+        return std::make_unique<LaneKernel<Estimator, Real, kWidth, 4>>(four_, four_in_lanes_);
+    }
     if constexpr (kOfFixedWidth) {
       if (channels == 3) return std::make_unique<BlockKernel<Estimator, SpectrumOf<3>>>(three_, channels);
       if (channels == 4) return std::make_unique<BlockKernel<Estimator, SpectrumOf<4>>>(four_, channels);
@@ -91,6 +102,12 @@ class EstimatorTemplate final : public EstimatorSource {
     return E::kRange;
   }
 
+  /// Whether all channels take the same flights.
+  bool shares_walk(int channels) const {
+    if constexpr (Traits::kFliesOnce) return grey_.flies_once(channels);
+    return true;
+  }
+
   template <class E>
   static void visit_parameters(E& estimator, ParameterVisitor& visit) {
     if constexpr (requires { estimator.parameters(visit); }) estimator.parameters(visit);
@@ -100,6 +117,7 @@ class EstimatorTemplate final : public EstimatorSource {
   static constexpr bool kInLanes = runs_in_lanes<Estimator>();
   /// Widths known to the compiler take half the time, and each adds a second to a tracker's compilation: not for planted bugs.
   static constexpr bool kOfFixedWidth = !kGreyOnly && !kPlanted;
+  static constexpr bool kColoursInLanes = kInLanes && kOfFixedWidth;
 
   Estimator<Real> grey_;
   [[no_unique_address]] std::conditional_t<kOfFixedWidth, Estimator<SpectrumOf<3>>, None> three_;
@@ -107,6 +125,8 @@ class EstimatorTemplate final : public EstimatorSource {
   [[no_unique_address]] Chromatic chromatic_;
   [[no_unique_address]] std::conditional_t<kInLanes, LanesOf<Estimator, Real>, None> lanes_;
   [[no_unique_address]] std::conditional_t<kInLanes, LanesOf<Estimator, float>, None> single_;
+  [[no_unique_address]] std::conditional_t<kColoursInLanes, LanesOf<Estimator, Real, 3>, None> three_in_lanes_;
+  [[no_unique_address]] std::conditional_t<kColoursInLanes, LanesOf<Estimator, Real, 4>, None> four_in_lanes_;
 };
 
 }  // namespace nullmark

@@ -6,14 +6,37 @@
 
 #include "estimators/walk/lane_flight.h"
 #include "harness/kernel/block_kernel.h"
+#include "media/base/colour_lanes.h"
 
 namespace nullmark {
 
-/// Visits the n members of an aggregate in their order.
-template <std::size_t n, class Aggregate, class Visit>
-[[gnu::always_inline]] inline void each_member(Aggregate& x, const Visit& visit) {
-  static_assert(n >= 1 && n <= 4, "a walk in lanes holds one to four numbers");
-  const auto all = [&](auto&... members) __attribute__((always_inline)) { (visit(members), ...); };
+/// Becomes anything.
+struct Anything {
+  template <class T>
+  operator T() const;
+};
+
+/// Number of members of an aggregate.
+template <class Aggregate, class... Members>
+consteval std::size_t member_count() {
+  if constexpr (requires { Aggregate{Members()..., Anything()}; })
+    return member_count<Aggregate, Members..., Anything>();
+  else
+    return sizeof...(Members);
+}
+
+/// Visits the registers of an aggregate in their order.
+template <class Aggregate, class Visit>
+[[gnu::always_inline]] inline void each_register(Aggregate& x, const Visit& visit) {
+  constexpr std::size_t n = member_count<Aggregate>();
+  static_assert(n >= 1 && n <= 4, "a walk in lanes has one to four members");
+  const auto one = [&](auto& member) __attribute__((always_inline)) {
+    if constexpr (requires { member.kChannels; })
+      for (std::size_t c = 0; c < member.kChannels; ++c) visit(member[c]);
+    else
+      visit(member);
+  };
+  const auto all = [&](auto&... members) __attribute__((always_inline)) { (one(members), ...); };
   if constexpr (n == 1) {
     auto& [a] = x;
     all(a);
@@ -34,14 +57,15 @@ template <std::size_t n, class Aggregate, class Visit>
 /// compacted. An estimator takes part by `static constexpr bool kLanes = true`, with a Walk that holds only Value,
 /// Distance<Value> and Truth<Value>, and with functions that take ray, flight and stream as auto.  Lanes answer transmittance and
 /// optical depth.  In double the base answers the other quantities; float has no others.
-template <template <class> class Estimator, class T, std::size_t N = kNativeLanes<T>>
-class LaneKernel final : public BlockKernel<Estimator, Real> {
-  using Base = BlockKernel<Estimator, Real>;
-  using Traits = EstimatorTraits<Estimator<Real>, Real>;
+template <template <class> class Estimator, class T, std::size_t N = kNativeLanes<T>, std::size_t C = 1>
+class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
+  using Base = BlockKernel<Estimator, OfChannels<C>>;
+  using Traits = EstimatorTraits<Estimator<OfChannels<C>>, OfChannels<C>>;
   using Pack = Lanes<T, N>;
+  using Value = LaneValue<T, N, C>;
   using Mask = LaneMask<T, N>;
   using Index = LaneIndex<T, N>;
-  using E = Estimator<Pack>;
+  using E = Estimator<Value>;
   using Rates = LaneRates<T, N>;
   using Streams = LaneRng<T, N>;
 
@@ -63,26 +87,37 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       next(place.piece);
       next(place.depth);
       next(place.position);
-      each_member<sizeof(walk) / sizeof(Pack)>(walk, next);
+      each_register(walk, next);
       for (auto& word : stream) next(word);
     }
-  };
-  static constexpr std::size_t kNumbers = sizeof(Walks) / sizeof(Pack), kSample = 0, kPiece = 1;
-  static constexpr std::size_t kMaskBytes = 8;  ///< largest size of a stored mask
 
+    /// Those of the estimator.
+    template <class Visit>
+    [[gnu::always_inline]] void each_of_walk(const Visit& visit) {
+      std::size_t n = kWalk;
+      each_register(
+          walk, [&](auto& lanes) __attribute__((always_inline)) { visit(lanes, n++); });
+    }
+  };
+  static constexpr std::size_t kNumbers = sizeof(Walks) / sizeof(Pack), kSample = 0, kPiece = 1, kWalk = 4;
+
+  /// Rows of a multiple of 2 KiB would let loads wait for stores to other rows, whose addresses have the same low bits.
+  static constexpr std::size_t kRow = kBlock + HWY_MAX_BYTES / sizeof(T);
   struct State final : Base::State {
     /// [number of a walk][walk]; whole registers may be read at the end.
-    alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock>, kNumbers> numbers{};
-    alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock>, 3> points{};  ///< [axis][walk]
-    alignas(HWY_MAX_BYTES) std::array<T, kBlock> extinction{};
-    alignas(HWY_MAX_BYTES) std::array<T, kBlock> result{}, steps{};  ///< of walks that have ended; steps are the bits of an Index
-    std::array<std::uint8_t, kBlock / N * kMaskBytes> alive{};
+    alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, kNumbers> numbers{};
+    alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, 3> points{};  ///< [axis][walk]
+    alignas(HWY_MAX_BYTES) std::array<T, kRow * C> extinction{};
+    alignas(HWY_MAX_BYTES) std::array<T, kRow> steps{};  ///< of walks that have ended, as the bits of an Index
+    std::array<std::uint8_t, kBlock / N * Mask::kBytes> ended{};
     /// Results of ended walks after compaction; whole registers are written at the end.
-    alignas(HWY_MAX_BYTES) std::array<T, kBlock + N> left_result{}, left_sample{}, left_steps{};
+    alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock + N>, C> left_result{};
+    alignas(HWY_MAX_BYTES) std::array<T, kBlock + N> left_sample{}, left_steps{};
   };
 
  public:
-  LaneKernel(const Estimator<Real>& estimator, const E& in_lanes) : Base(estimator, 1), estimator_(in_lanes) {}
+  LaneKernel(const Estimator<OfChannels<C>>& estimator, const E& in_lanes)
+      : Base(estimator, static_cast<int>(C)), estimator_(in_lanes) {}
 
   std::unique_ptr<Workspace> workspace() const override { return std::make_unique<State>(); }
 
@@ -100,11 +135,18 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     // One walk would leave all lanes but its own idle.
     if (!kSingle && (state.recording || !in_lanes(quantity) || count == 1))
       return Base::sample(workspace, medium, context, key, first, count, quantity, out, counters);
-    out.values.resize(count);
+    out.values.resize(count * C);
     out.lookups.resize(count);
     counters.samples += count;
     for (std::size_t done = 0; done < count; done += kBlock)
-      Run{*this,   state, medium, context, {key, context.index, first + done}, quantity, &out.values[done], &out.lookups[done],
+      Run{*this,
+          state,
+          medium,
+          context,
+          {key, context.index, first + done},
+          quantity,
+          &out.values[done * C],
+          &out.lookups[done],
           counters}
           .block(std::min(kBlock, count - done));
   }
@@ -144,7 +186,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       std::size_t lanes = (count + N - 1) / N * N;
       for (std::size_t axis = 0; axis < 3; ++axis)
         if (!moves_along(axis)) std::fill_n(state.points[axis].begin(), lanes, origin[axis]);
-      for (std::size_t k = 0; k < lanes; k += N) set_out(k, Mask::first(std::min(N, count - k)), tally);
+      for (std::size_t k = 0; k < lanes; k += N) set_out(k, tally);
       lanes = close_ranks(lanes, tally);
       for (std::uint32_t step = 1; lanes > 0; ++step) {
         if (step % Base::kStepsBetweenStops == 0 && state.stop()) return;
@@ -155,9 +197,9 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
         const auto& [x, y, z] = state.points;
         medium.extinction(BasicPoints<T>{x.data(), y.data(), z.data(), lanes}, state.extinction.data());
         if (rates.has_several())
-          for (std::size_t k = 0; k < lanes; k += N) go_on<true>(k, step, tally);
+          go_on<true>(lanes, step, tally);
         else
-          for (std::size_t k = 0; k < lanes; k += N) go_on<false>(k, step, tally);
+          go_on<false>(lanes, step, tally);
         // Moving walks costs more than idle lanes do, until a quarter of them idles.
         if (4 * tally.dead >= lanes) lanes = close_ranks(lanes, tally);
       }
@@ -167,7 +209,13 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       if constexpr (!Traits::kIgnoresMajorant) counters.null_collisions += tally.lookups - tally.real;
     }
 
-    [[gnu::noinline, gnu::flatten]] void set_out(std::size_t k, Mask there, Tally& tally) {
+    /// Lanes from k on that hold a walk; all but the last register are full.
+    [[gnu::always_inline]] static Mask there(std::size_t k, const Tally& tally) {
+      return k + N <= tally.walks ? Mask(true) : Mask::first(tally.walks - k);
+    }
+
+    [[gnu::noinline, gnu::flatten]] void set_out(std::size_t k, Tally& tally) {
+      const Mask there = this->there(k, tally);
       Walks walks;
       walks.stream = Streams::seeded({first.key, first.ray, first.sample + k});
       walks.sample = Index::counting_from(static_cast<typename Index::Number>(k));
@@ -176,42 +224,53 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       flight.start(state.ray.majorant);
       kernel.estimator_.init(walks.walk, state.ray, flight, rng);
       bits(walks.sample).store(&state.numbers[kSample][k]);
-      propose(k, walks, there, flight, rng, 0, tally);
+      propose(k, walks, there, false, flight, rng, 0, tally);
       tally.dead += N - count(there);
     }
 
+    /// One step of all walks.  What the loop reads is copied first: the compiler must assume that a register's store changes
+    /// anything else.
     template <bool several>
-    [[gnu::always_inline]] void go_on(std::size_t k, std::uint32_t step, Tally& tally) {
-      const Mask alive = Mask::load(&state.alive[k / N * kMaskBytes]);
+    [[gnu::always_inline]] void go_on(std::size_t lanes, std::uint32_t step, Tally& tally) {
+      Run here = *this;
+      for (std::size_t k = 0; k < lanes; k += N) here.template step_on<several>(k, step, tally);
+    }
+
+    template <bool several>
+    [[gnu::always_inline]] void step_on(std::size_t k, std::uint32_t step, Tally& tally) {
+      const Mask ended = Mask::load(&state.ended[k / N * Mask::kBytes]), alive = there(k, tally) & !ended;
       Walks walks;
       walks.place.piece = Index(0);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
-        if (n == kPiece && !several) return;
-        using Number = std::remove_reference_t<decltype(lanes)>;
-        lanes = Number(hn::BitCast(hn::DFromV<decltype(raw(lanes))>(), Pack::load(&state.numbers[n][k]).vector()));
+        if (n != kPiece || several) load(lanes, n, k);
       });
       LaneFlight<T, N, several> flight(rates, walks.place);
       Streams rng(walks.stream, alive);
-      const Pack extinction = Pack::load(&state.extinction[k]);
+      const Value extinction = Value::load(&state.extinction[k * C]);
       if constexpr (!Traits::kIgnoresMajorant)
-        audit_majorant(extinction, majorant.template rate<several>(flight.piece()), alive, tally.violations,
+        audit_majorant(largest(extinction), majorant.template rate<several>(flight.piece()), alive, tally.violations,
                        counters.largest_violation);
       kernel.estimator_.consume(walks.walk, state.ray, flight, extinction, rng);
-      propose(k, walks, alive, flight, rng, step, tally);
+      propose(k, walks, alive, ended, flight, rng, step, tally);
     }
 
-    /// Computes the next points of the walks; ended walks store their result.
+    /// Computes the next points of the walks.  The numbers of an ended walk stay what they were at its end.
     template <bool several>
-    [[gnu::always_inline]] void propose(std::size_t k, Walks& walks, Mask alive, LaneFlight<T, N, several>& flight, Streams& rng,
-                                        std::uint32_t step, Tally& tally) {
+    [[gnu::always_inline]] void propose(std::size_t k, Walks& walks, Mask alive, Mask ended, LaneFlight<T, N, several>& flight,
+                                        Streams& rng, std::uint32_t step, Tally& tally) {
       const Mask goes_on = alive & kernel.estimator_.propose(walks.walk, state.ray, flight, rng), ends = alive & !goes_on;
       tally.draws += rng.draws();
       tally.dead += count(ends);
       if constexpr (requires { kernel.estimator_.real_collisions(walks.walk, state.ray); })
         tally.real += count(ends & kernel.estimator_.real_collisions(walks.walk, state.ray));
-      answer(walks).store(&state.result[k], ends);
+      if (step > 0)
+        walks.each_of_walk([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
+          auto before = lanes;
+          load(before, n, k);
+          lanes = select(ended, before, lanes);
+        });
       bits(Index(static_cast<typename Index::Number>(step))).store(&state.steps[k], ends);
-      goes_on.store(&state.alive[k / N * kMaskBytes]);
+      (ended | ends).store(&state.ended[k / N * Mask::kBytes]);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
         if (n == kPiece && !several) return;
         bits(lanes).store(&state.numbers[n][k]);
@@ -221,7 +280,7 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
         if (moves_along(axis)) (Pack(origin[axis]) + t * Pack(direction[axis])).store(&state.points[axis][k]);
     }
 
-    Pack answer(const Walks& walks) const {
+    Value answer(const Walks& walks) const {
       if constexpr (requires { kernel.estimator_.optical_depth(walks.walk, state.ray); })
         if (quantity == Quantity::optical_depth) return kernel.estimator_.optical_depth(walks.walk, state.ray);
       return kernel.estimator_.result(walks.walk, state.ray);
@@ -231,13 +290,15 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
     [[gnu::noinline]] std::size_t close_ranks(std::size_t lanes, Tally& tally) {
       std::size_t kept = 0, left = 0;
       for (std::size_t k = 0; k < lanes; k += N) {
-        const Mask alive = Mask::load(&state.alive[k / N * kMaskBytes]);
-        const Mask there = Mask::first(k < tally.walks ? std::min(N, tally.walks - k) : 0), dead = there & !alive;
+        const Mask dead = Mask::load(&state.ended[k / N * Mask::kBytes]), alive = there(k, tally) & !dead;
         const auto close = [k](const ClosedRanks<T, N>& ranks, const auto& from, auto& to, std::size_t at) {
           Pack(ranks(Pack::load(&from[k]).vector())).store(&to[at]);
         };
         const ClosedRanks<T, N> close_dead(dead), close_living(alive);
-        close(close_dead, state.result, state.left_result, left);
+        Walks walks;
+        walks.each_of_walk([&](auto& number, std::size_t n) { load(number, n, k); });
+        const Value answer = this->answer(walks);
+        for (std::size_t c = 0; c < C; ++c) Pack(close_dead(channel(answer, c).vector())).store(&state.left_result[c][left]);
         close(close_dead, state.steps, state.left_steps, left);
         close(close_dead, state.numbers[kSample], state.left_sample, left);
         left += count(dead);
@@ -249,15 +310,21 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
       }
       for (std::size_t i = 0; i < left; ++i) {
         const auto sample = static_cast<std::size_t>(std::bit_cast<typename Index::Number>(state.left_sample[i]));
-        values[sample] = state.left_result[i];
+        for (std::size_t c = 0; c < C; ++c) values[sample * C + c] = state.left_result[c][i];
         lookups[sample] = static_cast<std::uint32_t>(std::bit_cast<typename Index::Number>(state.left_steps[i]));
         tally.lookups += lookups[sample];
       }
       lanes = (kept + N - 1) / N * N;
-      for (std::size_t k = 0; k < lanes; k += N) Mask::first(std::min(N, kept - k)).store(&state.alive[k / N * kMaskBytes]);
+      for (std::size_t k = 0; k < lanes; k += N) Mask(false).store(&state.ended[k / N * Mask::kBytes]);
       tally.dead = lanes - kept;
       tally.walks = kept;
       return lanes;
+    }
+
+    /// Reads a register of the walks from k on.
+    template <class Number>
+    [[gnu::always_inline]] void load(Number& lanes, std::size_t n, std::size_t k) const {
+      lanes = Number(hn::BitCast(hn::DFromV<decltype(raw(lanes))>(), Pack::load(&state.numbers[n][k]).vector()));
     }
 
     static auto raw(const auto& lanes) {
@@ -274,19 +341,19 @@ class LaneKernel final : public BlockKernel<Estimator, Real> {
   E estimator_;
 };
 
-/// Lane kernel with registers of this build's width.
-template <template <class> class Estimator, class T>
-using LanesOf = Estimator<Lanes<T, kNativeLanes<T>>>;
+/// The estimator in registers of this build's width.
+template <template <class> class Estimator, class T, std::size_t C = 1>
+using LanesOf = Estimator<LaneValue<T, kNativeLanes<T>, C>>;
 
-/// Whether all functions of a walk accept lanes.
-template <template <class> class Estimator>
+/// Whether all functions of a walk over C channels accept lanes.
+template <template <class> class Estimator, std::size_t C = 1>
 constexpr bool runs_in_lanes() {
   if constexpr (requires { requires Estimator<Real>::kLanes; }) {
-    using E = LanesOf<Estimator, Real>;
-    using Along = typename detail::RayDataOf<Estimator<Real>, Real>::type;
+    using E = LanesOf<Estimator, Real, C>;
+    using Along = typename detail::RayDataOf<Estimator<OfChannels<C>>, OfChannels<C>>::type;
     constexpr std::size_t kWidth = kNativeLanes<Real>;
     return requires(const E& e, typename E::Walk& walk, const Along& ray, LaneFlight<Real, kWidth>& flight,
-                    LaneRng<Real, kWidth>& rng, const Lanes<Real, kWidth>& extinction) {
+                    LaneRng<Real, kWidth>& rng, const LaneValue<Real, kWidth, C>& extinction) {
       e.init(walk, ray, flight, rng);
       e.propose(walk, ray, flight, rng);
       e.consume(walk, ray, flight, extinction, rng);

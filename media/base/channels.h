@@ -29,12 +29,9 @@ class Spectral final : public Medium {
 
   void extinction(const Points& points, Real* out) const override {
     grey_->extinction(points, out);
-    // The grey values sit at the front of out; spreading them from the last one on overwrites none that is still needed.
-    const auto n = static_cast<std::size_t>(channels());
-    for (std::size_t i = points.size; i-- > 0;) {
-      const Real grey = out[i];
-      for (std::size_t c = 0; c < n; ++c) out[i * n + c] = spectrum_[static_cast<Eigen::Index>(c)] * grey;
-    }
+    if (channels() == 3) return spread(SpectrumOf<3>(spectrum_), points.size, out);
+    if (channels() == 4) return spread(SpectrumOf<4>(spectrum_), points.size, out);
+    spread(spectrum_, points.size, out);
   }
 
   Extrema extrema(const Box& box) const override {
@@ -62,6 +59,16 @@ class Spectral final : public Medium {
   }
 
  private:
+  /// The grey values sit at the front of out; spreading them from the last one on overwrites none that is still needed.
+  template <class Factors>
+  static void spread(const Factors factors, std::size_t size, Real* out) {
+    const Eigen::Index n = factors.size();
+    for (std::size_t i = size; i-- > 0;) {
+      const Real grey = out[i];
+      for (Eigen::Index c = 0; c < n; ++c) out[i * static_cast<std::size_t>(n) + static_cast<std::size_t>(c)] = factors[c] * grey;
+    }
+  }
+
   std::shared_ptr<const Medium> grey_;
   Spectrum spectrum_;
 };

@@ -57,6 +57,7 @@ class Lanes {
   friend Lanes smaller(Lanes a, Lanes b) { return hn::Min(a.vector_, b.vector_); }
   friend Lanes larger(Lanes a, Lanes b) { return hn::Max(a.vector_, b.vector_); }
   friend Lanes smallest(Lanes a) { return a; }
+  friend Lanes largest(Lanes a) { return a; }
   friend Lanes magnitude(Lanes a) { return hn::Abs(a.vector_); }
   friend Lanes signed_root(Lanes a) { return hn::CopySign(hn::Sqrt(hn::Abs(a.vector_)), a.vector_); }
   friend Lanes rounded_down(Lanes a) { return hn::Floor(a.vector_); }
@@ -70,8 +71,13 @@ class Lanes {
       return hn::Exp(Tag(), a.vector_);
     }
   }
-  /// At most 4 ulp off; 0 at 1.
-  friend Lanes logarithm(Lanes a) { return hn::Log(Tag(), a.vector_); }
+  /// At most 4 ulp off; 0 at 1.  Of normal numbers: a random number is one.
+  friend Lanes logarithm(Lanes a) {
+    if constexpr (requires { hn::impl::Log<Tag, Vector, false>(Tag(), a.vector_); })
+      return hn::impl::Log<Tag, Vector, false>(Tag(), a.vector_);
+    else
+      return hn::Log(Tag(), a.vector_);
+  }
   friend Lanes negative_logarithm(Lanes a) { return -logarithm(a); }
   /// 1 - e^a, at most 4 ulp off.
   friend Lanes one_minus_exponential(Lanes a) { return -Lanes(hn::Expm1(Tag(), a.vector_)); }
@@ -80,6 +86,15 @@ class Lanes {
   friend Lanes sine(Lanes a) { return hn::Sin(Tag(), a.vector_); }
   friend T least_normal(Lanes) { return std::numeric_limits<T>::min(); }
   friend LaneMask<T, N> vanished(Lanes a) { return a == Lanes(0); }
+  /// Sum of all lanes, each half onto the other: the same order at every N that starts from the same numbers.
+  friend T sum_of_halves(Lanes a) {
+    if constexpr (N == 1) {
+      return hn::GetLane(a.vector_);
+    } else {
+      const hn::FixedTag<T, N / 2> half;
+      return sum_of_halves(Lanes<T, N / 2>(hn::LowerHalf(half, a.vector_)) + Lanes<T, N / 2>(hn::UpperHalf(half, a.vector_)));
+    }
+  }
 
  private:
   Vector vector_;
@@ -91,14 +106,26 @@ class LaneMask {
  public:
   using Tag = hn::FixedTag<T, N>;
   using Mask = hn::Mask<Tag>;
+  static constexpr bool kBits = sizeof(Mask) < sizeof(hn::Vec<Tag>);
+  static constexpr std::size_t kBytes = kBits ? 8 : sizeof(hn::Vec<Tag>);
 
   LaneMask() = default;
   LaneMask(Mask mask) : mask_(mask) {}
   LaneMask(bool all) : LaneMask(first(all ? N : 0)) {}
   static LaneMask first(std::size_t n) { return hn::FirstN(Tag(), n); }
-  /// From and to 8 bytes.
-  static LaneMask load(const std::uint8_t* from) { return hn::LoadMaskBits(Tag(), from); }
-  void store(std::uint8_t* to) const { hn::StoreMaskBits(Tag(), mask_, to); }
+  /// From and to kBytes bytes: as bits where a mask is bits, and as the numbers that it is elsewhere.
+  static LaneMask load(const std::uint8_t* from) {
+    if constexpr (kBits)
+      return hn::LoadMaskBits(Tag(), from);
+    else
+      return hn::MaskFromVec(hn::LoadU(Tag(), reinterpret_cast<const T*>(from)));
+  }
+  void store(std::uint8_t* to) const {
+    if constexpr (kBits)
+      hn::StoreMaskBits(Tag(), mask_, to);
+    else
+      hn::StoreU(hn::VecFromMask(Tag(), mask_), Tag(), reinterpret_cast<T*>(to));
+  }
   Mask mask() const { return mask_; }
 
   friend LaneMask operator&(LaneMask a, LaneMask b) { return hn::And(a.mask_, b.mask_); }
@@ -126,6 +153,9 @@ class LaneTruth {
   operator LaneMask<T, N>() const { return hn::MaskFromVec(bits_); }
   friend LaneMask<T, N> operator!(LaneTruth a) { return !LaneMask<T, N>(a); }
   friend Lanes<T, N> select(LaneTruth yes, Lanes<T, N> a, Lanes<T, N> b) { return select(LaneMask<T, N>(yes), a, b); }
+  friend LaneTruth select(LaneMask<T, N> yes, LaneTruth a, LaneTruth b) {
+    return LaneTruth(hn::IfThenElse(yes.mask(), a.bits_, b.bits_));
+  }
 
  private:
   using Tag = hn::FixedTag<T, N>;
@@ -190,17 +220,23 @@ class ClosedRanks {
  public:
   explicit ClosedRanks(LaneMask<T, N> kept) {
     const typename LaneIndex<T, N>::Tag integers;
-    if constexpr (N == 8 && sizeof(T) == 8) {
+    if constexpr (N > 8) {
+      const auto mask = hn::RebindMask(integers, kept.mask());
+      order_ = hn::IndicesFromVec(hn::FixedTag<T, N>(), hn::Compress(hn::Iota(integers, 0), mask));
+    } else if constexpr (N > 1) {
       // Highway 1.0.3 copies its table of orders to the stack at every call.
       std::uint8_t bits[8];
       hn::StoreMaskBits(hn::FixedTag<T, N>(), kept.mask(), bits);
-      const std::uint64_t packed = kOrders[bits[0]];
-      order_ = hn::IndicesFromVec(
-          hn::FixedTag<T, N>(),
-          hn::And(hn::Shr(hn::Set(integers, static_cast<std::int64_t>(packed)), shifts(integers)), hn::Set(integers, 7)));
-    } else if constexpr (N > 1) {
-      const auto mask = hn::RebindMask(integers, kept.mask());
-      order_ = hn::IndicesFromVec(hn::FixedTag<T, N>(), hn::Compress(hn::Iota(integers, 0), mask));
+      const std::uint64_t& packed = kOrders[bits[0]];
+      if constexpr (sizeof(T) == 8) {
+        const hn::RebindToUnsigned<decltype(integers)> numbers;
+        const auto lanes = hn::And(hn::Shr(hn::Set(numbers, packed), shifts(numbers)), hn::Set(numbers, 7));
+        order_ = hn::IndicesFromVec(hn::FixedTag<T, N>(), hn::BitCast(integers, lanes));
+      } else {
+        const hn::Rebind<std::uint8_t, decltype(integers)> bytes;
+        const auto lanes = hn::PromoteTo(integers, hn::LoadU(bytes, reinterpret_cast<const std::uint8_t*>(&packed)));
+        order_ = hn::IndicesFromVec(hn::FixedTag<T, N>(), lanes);
+      }
     }
   }
 
@@ -225,7 +261,7 @@ class ClosedRanks {
     return orders;
   }();
 
-  static auto shifts(typename LaneIndex<T, N>::Tag integers) { return hn::ShiftLeft<3>(hn::Iota(integers, 0)); }
+  static auto shifts(auto integers) { return hn::ShiftLeft<3>(hn::Iota(integers, 0)); }
 
   struct Nothing {};
   template <std::size_t n>

@@ -22,6 +22,10 @@ inline constexpr int kMostChannels = 1;
 template <int width>
 inline constexpr int kMostChannels<SpectrumOf<width>> = SpectrumOf<width>::MaxRowsAtCompileTime;
 
+/// The Value of a medium whose number of channels the compiler knows.
+template <std::size_t channels>
+using OfChannels = std::conditional_t<channels == 1, Real, SpectrumOf<static_cast<int>(channels)>>;
+
 template <class Value>
 Value uniform_value(int channels, Real x) {
   if constexpr (kIsChromatic<Value>)
@@ -92,7 +96,7 @@ Evaluated<T> magnitude(const Colours<T>& x) {
 
 template <class T>
 Evaluated<T> exponential(const Colours<T>& x) {
-  return x.exp();
+  return x.unaryExpr([](Real one) { return exponential(one); });
 }
 
 /// sgn(x) |x|^(1/2), and what undoes it.
