@@ -23,6 +23,7 @@ struct AnalogDecompositionTracking {
   static constexpr SampleRange kRange = SampleRange::binary;
   static constexpr bool kNeedsBound = true;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kDrawsExponentials = true;
   static constexpr bool kGreyOnly = true;
 
   std::string control = "minimum";

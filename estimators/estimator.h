@@ -79,6 +79,8 @@ namespace nullmark {
 //       takes media of one channel; no kernel of several is compiled
 //   static constexpr bool kOwnFlights
 //       draws its flights by its own law
+//   static constexpr bool kDrawsExponentials
+//       with kOwnFlights: most steps draw an exponential first, so the loop takes the logarithms of a block together
 //   static constexpr bool kLanes = true
 //       walks run side by side in registers, in double and in float: Walk holds only Value, Distance<Value> and Truth<Value>;
 //       init, propose, consume and result take ray, flight and stream as auto, and branch by select() and flight.next(rng, alive)

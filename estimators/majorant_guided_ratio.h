@@ -24,6 +24,7 @@ struct MajorantGuidedRatio {
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kDrawsExponentials = true;
   static constexpr bool kLanes = true;
 
   std::string start = "majorant";

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <vector>
 
 #include "estimators/estimator.h"
+#include "estimators/walk/rng.h"
 #include "media/base/lanes.h"
 
 namespace nullmark {
@@ -26,102 +28,64 @@ struct BidirectionalMis {
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kDrawsExponentials = true;
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  /// Vertices that are joined to a vertex of the other walk together.
-  static constexpr std::size_t kTogether = 8;
-
-  /// What one walk leaves behind: a vertex for its origin and for each collision.
-  struct Prefix {
-    std::vector<Real> depth;    ///< majorant depth from the ray's begin
-    std::vector<Value> weight;  ///< product of null ratios up to the vertex, its own included
-    std::vector<Real> gap;      ///< e^gap to the vertex before; the last entry is that of the ray's end
-    std::vector<Real> gaps;     ///< sum of them up to the vertex
-    Real all_gaps = 0;          ///< sum of e^gap of the whole walk
-    Value whole;                ///< product of all null ratios
-
-    void start(Real at, const Value& one) {
-      depth.assign(1, at);
-      weight.assign(1, one);
-    }
-    void finish(Real end) {
-      const std::size_t n = depth.size();
-      whole = weight.back();
-      gap.resize(n + 1);
-      gap[0] = 0;
-      for (std::size_t j = 1; j < n; ++j) gap[j] = std::abs(depth[j] - depth[j - 1]);
-      gap[n] = std::abs(end - depth.back());
-      exponentials(gap.data(), n + 1, gap.data());
-      gaps.assign(n, 0);
-      for (std::size_t j = 1; j < n; ++j) gaps[j] = gaps[j - 1] + gap[j];
-      all_gaps = gaps.back() + gap[n];
-    }
+  /// One of both walks: a vertex for its origin and for each collision.
+  struct Vertex {
+    Real depth;    ///< majorant depth from the ray's begin
+    Real nearer;   ///< e^-gap to the vertex before
+    Value weight;  ///< product of null ratios up to the vertex, its own included
   };
 
   struct Walk {
-    Prefix forwards, backwards;
+    std::vector<Vertex> forwards, backwards;
     bool turned = false;
-    std::vector<Real> to_last;       ///< of the backward vertices: e^gap to the last one of their group of kTogether
-    std::vector<std::size_t> ahead;  ///< of the forward vertices: the backward vertices before which they lie
-    std::vector<Real> to_group;      ///< of the forward vertices: e^gap to the last vertex of the group that is nearest
+    Value joined;  ///< sum over the pairs
+    Value alone;   ///< sum over the whole walks
+    // The backward vertices side by side, their number rounded up to whole groups:
+    std::vector<Real> depth;    ///< as in the vertex, but inf for the ray's end; -inf in what completes the last group
+    std::vector<Real> gaps;     ///< sum of e^gap up to the vertex
+    std::vector<Real> ahead;    ///< e^(depth beyond a forward vertex)
+    std::vector<Value> weight;  ///< as in the vertex
   };
 
   void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const {
-    walk.forwards.start(0, ray.value(1));
-    walk.backwards.start(ray.majorant.total_depth(), ray.value(1));
+    walk.forwards.assign(1, {0, kInfinity, ray.value(1)});
+    walk.backwards.assign(1, {ray.majorant.total_depth(), kInfinity, ray.value(1)});
     walk.turned = false;
   }
 
   bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
     const Real total = ray.majorant.total_depth();
     if (!walk.turned) {
-      const Real depth = walk.forwards.depth.back() + rng.exponential();
+      const auto [e, nearer] = exponential_and_decay(rng);
+      const Real depth = walk.forwards.back().depth + e;
       if (depth < total) {
-        walk.forwards.depth.push_back(depth);
+        walk.forwards.push_back({depth, nearer, {}});
         return flight.advance_to(depth);
       }
-      walk.forwards.finish(total);
       walk.turned = true;
     }
-    const Real depth = walk.backwards.depth.back() - rng.exponential();
+    const auto [e, nearer] = exponential_and_decay(rng);
+    const Real depth = walk.backwards.back().depth - e;
     if (!(depth > 0) || !(depth < total)) {
-      walk.backwards.finish(0);
-      group(walk);
+      join(walk, total, ray.channels);
       return false;
     }
-    walk.backwards.depth.push_back(depth);
+    walk.backwards.push_back({depth, nearer, {}});
     flight.start(ray.majorant);
     return flight.advance_to(depth);
   }
 
   void consume(Walk& walk, const MediumRay<Value>&, const Flight& at, const Value& extinction, auto&) const {
-    std::vector<Value>& weight = (walk.turned ? walk.backwards : walk.forwards).weight;
-    weight.push_back(weight.back() * null_ratio(at, extinction));
+    std::vector<Vertex>& vertices = walk.turned ? walk.backwards : walk.forwards;
+    Vertex* const last = &vertices.back();
+    last->weight = last[-1].weight * null_ratio(at, extinction);
   }
 
-  /// Pairs are summed from the nearest group outwards, until what is left of a vertex is lost in the rounding of the sum: their
-  /// number grows as the depth, not as its square.
-  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
-    const Prefix &a = walk.forwards, &b = walk.backwards;
-    Value sum = a.whole / (2 + a.all_gaps) + b.whole / (2 + b.all_gaps);
-    Real heaviest = 0;
-    for (const Value& weight : b.weight) heaviest = std::max(heaviest, largest(Value(magnitude(weight))));
-    const Real most = heaviest * static_cast<Real>(b.depth.size());
-    for (std::size_t i = 0; i < a.depth.size(); ++i) {
-      // Products of a million factors do not reach 0 but stay at the least denormal number, and all of their pairs add nothing.
-      if (largest(Value(magnitude(a.weight[i]))) * most < std::numeric_limits<Real>::min()) continue;
-      std::size_t ahead = walk.ahead[i];
-      for (Real gap = walk.to_group[i]; ahead > 0;) {
-        const std::size_t first = begin_of_group(ahead);
-        sum += a.weight[i] * joined(walk, first, ahead - first, 2 + a.gaps[i], gap);
-        gap *= walk.to_last[first] * b.gap[first];
-        if (is_rounding(a.weight[i], heaviest * static_cast<Real>(first), gap, sum, ray.channels)) break;
-        ahead = first;
-      }
-    }
-    return sum;
-  }
+  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.joined + walk.alone; }
 
   Theory theory(const MediumRay<Value>& ray, const RayProfile&, int, Quantity) const {
     const Real lookups = 2 * ray.majorant.total_depth();
@@ -129,46 +93,95 @@ struct BidirectionalMis {
   }
 
  private:
-  static std::size_t begin_of_group(std::size_t end) { return (end - 1) / kTogether * kTogether; }
+  /// Vertices that are joined to a vertex of the other walk together.
+  static constexpr std::size_t kTogether = 8;
+  /// Depth over which e^depth is a product of one exponential with the e^gap between.
+  static constexpr Real kStretch = 32;
 
-  /// What `result` reads of both walks.  The last group is completed with vertices of weight 0.
-  static void group(Walk& walk) {
-    const Prefix& a = walk.forwards;
-    Prefix& b = walk.backwards;
-    const std::size_t n = b.depth.size(), padded = begin_of_group(n) + kTogether;
-    walk.to_last.assign(padded, 1);
-    for (std::size_t j = n - 1; j-- > 0;)
-      if ((j + 1) % kTogether != 0) walk.to_last[j] = walk.to_last[j + 1] * b.gap[j + 1];
-    b.gaps.resize(padded, 0);
-    b.weight.resize(padded, b.whole * 0);
-    walk.ahead.resize(a.depth.size());
-    walk.to_group.resize(a.depth.size());
-    std::size_t ahead = n;
-    for (std::size_t i = 0; i < a.depth.size(); ++i) {
-      while (ahead > 1 && !(b.depth[ahead - 1] > a.depth[i])) --ahead;
-      walk.ahead[i] = ahead;
-      walk.to_group[i] = b.depth[std::min(begin_of_group(ahead) + kTogether, n) - 1] - a.depth[i];
+  /// Pairs are summed from the nearest group outwards, until what is left of a vertex is lost in the rounding of the sum: their
+  /// number grows as the depth, not as its square.
+  static void join(Walk& walk, Real total, int channels) {
+    const std::vector<Vertex>&a = walk.forwards, &b = walk.backwards;
+    const Real heaviest = line_up(walk), most = heaviest * static_cast<Real>(b.size());
+    walk.alone = b.back().weight / (2 + walk.gaps[b.size() - 1] + exponential(b.back().depth));
+    Value sum = walk.alone * 0;
+    std::size_t nearest = walk.depth.size() - kTogether;  // begin of the last group with a vertex beyond the forward one
+    // ahead[j] = e^(b_j - from) for j >= known, and nearer = e^(from - a_i).
+    Real from = -kInfinity, nearer = 1, gaps = 0;
+    std::size_t known = 0;
+    for (const Vertex& vertex : a) {
+      while (nearest > 0 && !(walk.depth[nearest] > vertex.depth)) nearest -= kTogether;
+      gaps += 1 / vertex.nearer;
+      nearer *= vertex.nearer;
+      if (vertex.depth - from > kStretch) {
+        from = vertex.depth;
+        nearer = 1;
+        known = std::min(nearest + kTogether, b.size()) - 1;
+        walk.ahead[known] = exponential(b[known].depth - from);
+      }
+      // Products of a million factors do not reach 0 but stay at the least denormal number, and all of their pairs add nothing.
+      if (largest(Value(magnitude(vertex.weight))) * most < std::numeric_limits<Real>::min()) continue;
+      for (std::size_t first = nearest;; first -= kTogether) {
+        for (; known > first; --known) walk.ahead[known - 1] = walk.ahead[known] * (1 / b[known].nearer);
+        sum += vertex.weight * joined(walk, first, vertex.depth, 2 + gaps, nearer);
+        if (first == 0 ||
+            is_rounding(vertex.weight, heaviest * static_cast<Real>(first), nearer * walk.ahead[first], sum, channels))
+          break;
+      }
     }
-    exponentials(walk.to_group.data(), walk.to_group.size(), walk.to_group.data());
+    walk.joined = sum;
+    walk.alone += a.back().weight / (2 + gaps + exponential(total - a.back().depth));
   }
 
-  /// sum_j B_j / (before + e^{gap_j} + gaps_j) over the first n vertices of a group whose last one is `gap` = e^gap away.
-  static Value joined(const Walk& walk, std::size_t first, std::size_t n, Real before, Real gap) {
+  /// Sets the backward vertices side by side.  Returns the largest weight.
+  static Real line_up(Walk& walk) {
+    const std::size_t n = walk.backwards.size(), padded = (n + kTogether - 1) / kTogether * kTogether;
+    for (std::vector<Real>* const numbers : {&walk.depth, &walk.gaps, &walk.ahead}) numbers->resize(padded);
+    walk.weight.resize(padded);
+    Real gaps = 0, heaviest = 0;
+    for (std::size_t j = 0; j < n; ++j) {
+      const Vertex& vertex = walk.backwards[j];
+      walk.depth[j] = vertex.depth;
+      walk.gaps[j] = gaps += 1 / vertex.nearer;
+      walk.weight[j] = vertex.weight;
+      heaviest = std::max(heaviest, largest(Value(magnitude(vertex.weight))));
+    }
+    walk.depth[0] = kInfinity;  // the ray's end lies beyond all vertices, also of a ray without depth
+    for (std::size_t j = n; j < padded; ++j) {
+      walk.depth[j] = -kInfinity;
+      walk.weight[j] = walk.backwards[0].weight;
+    }
+    return heaviest;
+  }
+
+  /// sum_j B_j / (before + e^{b_j - a} + gaps_j) over the vertices of a group that lie beyond depth a.
+  static Value joined(const Walk& walk, std::size_t first, Real a, Real before, Real nearer) {
     constexpr std::size_t kWidth = std::min(kTogether, kNativeLanes<Real>);
     using Pack = Lanes<Real, kWidth>;
-    Real share[kTogether];
-    for (std::size_t j = 0; j < kTogether; j += kWidth) {
-      const Pack to_last = Pack::load(&walk.to_last[first + j]), gaps = Pack::load(&walk.backwards.gaps[first + j]);
-      (Pack(1) / (Pack(before) + Pack(gap) * to_last + gaps)).store(share + j);
+    std::array<Pack, kTogether / kWidth> share;
+    for (std::size_t k = 0; k < share.size(); ++k) {
+      const std::size_t j = first + k * kWidth;
+      const Pack techniques = Pack(before) + Pack(nearer) * Pack::load(&walk.ahead[j]) + Pack::load(&walk.gaps[j]);
+      share[k] = select(Pack::load(&walk.depth[j]) > Pack(a), Pack(1) / techniques, Pack(0));
     }
-    std::fill(share + n, share + kTogether, 0);
-    const Value* const w = &walk.backwards.weight[first];
-    return ((w[0] * share[0] + w[4] * share[4]) + (w[2] * share[2] + w[6] * share[6])) +
-           ((w[1] * share[1] + w[5] * share[5]) + (w[3] * share[3] + w[7] * share[7]));
+    const Value* const w = &walk.weight[first];
+    if constexpr (std::is_same_v<Value, Real>) {
+      for (std::size_t k = 0; k < share.size(); ++k) share[k] *= Pack::load(w + k * kWidth);
+      for (std::size_t half = share.size() / 2; half > 0; half /= 2)
+        for (std::size_t k = 0; k < half; ++k) share[k] += share[k + half];
+      return sum_of_halves(share[0]);
+    } else {
+      Real s[kTogether];
+      for (std::size_t k = 0; k < share.size(); ++k) share[k].store(s + k * kWidth);
+      return ((w[0] * s[0] + w[4] * s[4]) + (w[2] * s[2] + w[6] * s[6])) +
+             ((w[1] * s[1] + w[5] * s[5]) + (w[3] * s[3] + w[7] * s[7]));
+    }
   }
 
   static bool is_rounding(const Value& weight, Real times, Real gap, const Value& sum, int channels) {
-    constexpr Real kRounding = 0x1p-60;
+    // Hardly any vertex is that light.
+    constexpr Real kFar = 0x1p40, kRounding = 0x1p-60;
+    if (gap < kFar) return false;
     for (int c = 0; c < channels; ++c)
       if (std::abs(channel(weight, c)) * times > kRounding * std::abs(channel(sum, c)) * gap) return false;
     return true;

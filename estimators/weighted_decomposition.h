@@ -26,6 +26,7 @@ struct WeightedDecompositionTracking {
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kDrawsExponentials = true;
   static constexpr bool kGreyOnly = true;
 
   std::string control = "minimum";

@@ -24,10 +24,7 @@ struct PlantedLostWalks : BidirectionalMis<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  Value result(const typename BidirectionalMis<Value>::Walk& walk, const MediumRay<Value>& ray) const {
-    const auto alone = [](const auto& prefix) { return Value(prefix.whole / (2 + prefix.all_gaps)); };
-    return BidirectionalMis<Value>::result(walk, ray) - alone(walk.forwards) - alone(walk.backwards);
-  }
+  Value result(const typename BidirectionalMis<Value>::Walk& walk, const MediumRay<Value>&) const { return walk.joined; }
 };
 
 }  // namespace nullmark

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <type_traits>
 
 #include "harness/kernel/free_path_scores.h"
@@ -22,7 +23,9 @@ class BlockKernel : public Kernel {
   using RayData = typename Traits::RayData;
   using Walk = typename E::Walk;
 
-  static constexpr std::size_t kBlock = 256;
+  /// As many walks as the L1 cache holds together, but enough of them to share what is done once a step.
+  static constexpr std::size_t kBlock = std::bit_floor(
+      std::clamp<std::size_t>((std::size_t{24} << 10) / (sizeof(Walk) + sizeof(Flight) + sizeof(Rng) + sizeof(Value)), 32, 256));
 
  protected:
   /// A walk this long is an error: no walk may hang, and none may be cut short silently.
@@ -235,7 +238,7 @@ class BlockKernel : public Kernel {
 
   /// Most walks draw an exponential next; their logarithms are taken together.
   static void draw_ahead(State& state, std::size_t active) {
-    if constexpr (Traits::kIgnoresMajorant || Traits::kOwnFlights) return;
+    if constexpr (Traits::kIgnoresMajorant || (Traits::kOwnFlights && !Traits::kDrawsExponentials)) return;
     for (std::size_t a = 0; a < active; ++a) state.ahead[a] = state.rng[state.active[a]].peek();
     negative_logarithms(state.ahead.data(), active, state.ahead.data());
     for (std::size_t a = 0; a < active; ++a) state.rng[state.active[a]].make_ready(state.ahead[a]);

@@ -111,6 +111,7 @@ struct EstimatorTraits {
   static constexpr bool kGreyOnly = requires { E::kGreyOnly; };
   static constexpr bool kIgnoresMajorant = requires { E::kIgnoresMajorant; };
   static constexpr bool kOwnFlights = requires { E::kOwnFlights; };
+  static constexpr bool kDrawsExponentials = requires { E::kDrawsExponentials; };
   static constexpr bool kNeedsInversion = requires { E::kNeedsInversion; };
   static constexpr bool kNeedsKnots = requires { E::kNeedsKnots; };
   static constexpr bool kNeedsShares = requires { E::kNeedsShares; };

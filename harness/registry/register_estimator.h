@@ -38,6 +38,7 @@ std::vector<std::pair<const char*, bool>> optional_members() {
           {"kHeavySamples", samples},
           {"kHeavyLookups", lookups},
           {"kOwnFlights", Traits::kOwnFlights},
+          {"kDrawsExponentials", Traits::kDrawsExponentials},
           {"kNeedsOpticalDepth", depth},
           {"kNeedsKnots", Traits::kNeedsKnots},
           {"kNeedsInversion", Traits::kNeedsInversion},
