@@ -82,7 +82,8 @@ namespace nullmark {
 //   static constexpr bool kDrawsExponentials
 //       with kOwnFlights: most steps draw an exponential first, so the loop takes the logarithms of a block together
 //   static constexpr bool kLanes = true
-//       walks run side by side in registers, in double and in float: Walk holds only Value, Distance<Value> and Truth<Value>;
+//       walks run side by side in registers, in double and in float, of 3 and 4 channels in double: Walk holds only Value,
+//       Distance<Value> and Truth<Value>, which the loop no longer changes once a walk has ended;
 //       init, propose, consume and result take ray, flight and stream as auto, and branch by select() and flight.next(rng, alive)
 //       where walks can differ (see lane_kernel.h)
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares

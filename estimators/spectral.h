@@ -110,9 +110,8 @@ struct SpectralTracking {
     walk.lookup_chance = lookup_chance(ray, walk.weight, flight.rate(), flight.piece());
     const Real u = rng.uniform();
     if (u < walk.lookup_chance) return true;
-    const Value heeded = SpectralTracking::heeded(ray, walk.weight);
-    const Real absorb = ray.draws_absorption ? measure(ray, heeded, split.absorb) : 0,
-               scatter = measure(ray, heeded, split.scatter);
+    const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, split.absorb) : 0,
+               scatter = measure(ray, walk.weight, split.scatter);
     const Real chance = 1 - walk.lookup_chance;
     walk.kind = choose_event((u - walk.lookup_chance) / chance, absorb, scatter, 0);
     take(walk, ray, walk.kind == EventKind::absorb ? split.absorb : split.scatter, flight.rate() * chance,
@@ -123,9 +122,8 @@ struct SpectralTracking {
   void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     Coefficients<Value> mu = ray.coefficients(extinction, at.position(), at.rate());
     if (!ray.control.empty()) mu = residual(ray, mu, at.piece());
-    const Value heeded = SpectralTracking::heeded(ray, walk.weight);
-    const Real absorb = ray.draws_absorption ? measure(ray, heeded, mu.absorb) : 0, scatter = measure(ray, heeded, mu.scatter),
-               null = measure(ray, heeded, mu.null);
+    const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : 0,
+               scatter = measure(ray, walk.weight, mu.scatter), null = measure(ray, walk.weight, mu.null);
     const EventKind kind = choose_event(rng.uniform(), absorb, scatter, null);
     walk.kind = kind;
     walk.looked_up = kind != EventKind::escape;
@@ -178,14 +176,9 @@ struct SpectralTracking {
     return all;
   }
 
-  /// The weight of the path so far where the scheme heeds it, else 1.
-  static Value heeded(const RayData& ray, const Value& weight) {
-    return ray.by_history ? Value(ray.throughput * weight) : ray.value(1);
-  }
-
   /// R_k of the scheme.
-  static Real measure(const RayData& ray, const Value& heeded, const Value& coefficient) {
-    const Value x = magnitude(Value(heeded * coefficient));
+  static Real measure(const RayData& ray, const Value& weight, const Value& coefficient) {
+    const Value x = magnitude(ray.by_history ? Value(ray.throughput * weight * coefficient) : coefficient);
     return ray.by_maximum ? largest(x) : average(x);
   }
 
@@ -194,8 +187,7 @@ struct SpectralTracking {
     const Control& split = ray.control[piece];
     Value least = magnitude(Value(mub - split.all));
     for (int l = 0; l < ray.channels; ++l) channel(least, l) = std::max(channel(least, l), channel(split.excess, l));
-    const Value heeded = SpectralTracking::heeded(ray, weight);
-    const Real rest = measure(ray, heeded, least), own = measure(ray, heeded, ray.draws_absorption ? split.all : split.scatter);
+    const Real rest = measure(ray, weight, least), own = measure(ray, weight, ray.draws_absorption ? split.all : split.scatter);
     return own > 0 ? rest / (own + rest) : 1;
   }
 
@@ -229,9 +221,8 @@ struct SpectralTracking {
         lookup = lookup_chance(ray, weight, mub, piece);
         mu = residual(ray, mu, piece);
       }
-      const Value heeded = SpectralTracking::heeded(ray, weight);
-      const Real absorb = ray.draws_absorption ? measure(ray, heeded, mu.absorb) : 0, scatter = measure(ray, heeded, mu.scatter),
-                 free = measure(ray, heeded, mu.null);
+      const Real absorb = ray.draws_absorption ? measure(ray, weight, mu.absorb) : 0, scatter = measure(ray, weight, mu.scatter),
+                 free = measure(ray, weight, mu.null);
       if (!(free > 0)) return;
       null = lookup * free / (absorb + scatter + free);
       factor = mu.null / (mub * null);

@@ -52,11 +52,12 @@ template <class Aggregate, class Visit>
   }
 }
 
-/// The loop of BlockKernel with N walks per register: the same estimator source over Lanes, the same steps, and in double the
-/// same samples bit for bit.  All walks of a block take a step together.  Ended walks leave the block, and the others are
-/// compacted. An estimator takes part by `static constexpr bool kLanes = true`, with a Walk that holds only Value,
-/// Distance<Value> and Truth<Value>, and with functions that take ray, flight and stream as auto.  Lanes answer transmittance and
-/// optical depth.  In double the base answers the other quantities; float has no others.
+/// The loop of BlockKernel with N walks per register, over C channels: the same estimator source over Lanes or LaneColours, the
+/// same steps, and in double the same samples bit for bit.  All walks of a block take a step together.  The numbers of an ended
+/// walk stay what they were at its end until ended walks leave the block and the others are compacted.  An estimator takes part
+/// by `static constexpr bool kLanes = true`, with a Walk that holds only Value, Distance<Value> and Truth<Value>, and with
+/// functions that take ray, flight and stream as auto.  Lanes answer transmittance and optical depth.  In double the base answers
+/// the other quantities; float has no others.
 template <template <class> class Estimator, class T, std::size_t N = kNativeLanes<T>, std::size_t C = 1>
 class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
   using Base = BlockKernel<Estimator, OfChannels<C>>;

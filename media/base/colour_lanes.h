@@ -76,12 +76,16 @@ class LaneColours {
     for (std::size_t c = 0; c < C; ++c) mask.channels[c] = a[c] > b[c];
     return mask;
   }
+  friend Mask operator<(const LaneColours& a, const LaneColours& b) { return b > a; }
   friend LaneColours select(const Mask& yes, const LaneColours& a, const LaneColours& b) {
     LaneColours result;
     for (std::size_t c = 0; c < C; ++c) result[c] = select(yes.channels[c], a[c], b[c]);
     return result;
   }
 
+  friend LaneColours smaller(const LaneColours& a, const LaneColours& b) {
+    return each(a, b, [](Pack x, Pack y) { return smaller(x, y); });
+  }
   friend LaneColours larger(const LaneColours& a, const LaneColours& b) {
     return each(a, b, [](Pack x, Pack y) { return larger(x, y); });
   }

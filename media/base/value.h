@@ -96,7 +96,9 @@ Evaluated<T> magnitude(const Colours<T>& x) {
 
 template <class T>
 Evaluated<T> exponential(const Colours<T>& x) {
-  return x.unaryExpr([](Real one) { return exponential(one); });
+  Evaluated<T> result = x;
+  exponentials(result.data(), static_cast<std::size_t>(result.size()), result.data());
+  return result;
 }
 
 /// sgn(x) |x|^(1/2), and what undoes it.

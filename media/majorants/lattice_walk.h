@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 #include "media/base/types.h"
 
@@ -50,8 +49,6 @@ class LatticeWalk {
     const Vec3 start = local.at(from);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<Eigen::Index>(axis);
-      // Finite: 0 times it is then a number.
-      inverse_[axis] = std::clamp(1 / local.direction[k], std::numeric_limits<Real>::lowest(), std::numeric_limits<Real>::max());
       at_[axis] =
           std::clamp(static_cast<int>(std::floor((start[k] - lattice.lo[k]) / lattice.size[k])), 0, lattice.resolution[axis] - 1);
       next_[axis] = crossing(lattice, local, axis, at_[axis]);
@@ -87,17 +84,16 @@ class LatticeWalk {
 
   /// Where the ray leaves cell `at` along an axis.  From the plane's index, not accumulated, so that it does not drift over many
   /// cells.
-  Real crossing(const Lattice& lattice, const Ray& local, std::size_t axis, int at) const {
+  static Real crossing(const Lattice& lattice, const Ray& local, std::size_t axis, int at) {
     const auto k = static_cast<Eigen::Index>(axis);
     const Real direction = local.direction[k];
     if (direction == 0) return kInfinity;
-    return (lattice.lo[k] + (at + (direction > 0 ? 1 : 0)) * lattice.size[k] - local.origin[k]) * inverse_[axis];
+    return (lattice.lo[k] + (at + (direction > 0 ? 1 : 0)) * lattice.size[k] - local.origin[k]) / direction;
   }
 
   Real from_ = 0, end_ = 0;
   std::array<int, 3> at_{};
-  std::array<Real, 3> inverse_{};  ///< of the direction
-  /// Where the ray leaves its cell along each axis, and the one after it: the next step need not wait for it.
+  /// Where the ray leaves its cell along each axis, and the one after it: the next step need not wait for a division.
   std::array<Real, 3> next_{}, after_{};
 };
 
