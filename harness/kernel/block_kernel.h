@@ -236,9 +236,11 @@ class BlockKernel : public Kernel {
     }
   }
 
-  /// Most walks draw an exponential next; their logarithms are taken together.
+  /// Most walks draw an exponential next; their logarithms are taken together, where there are enough of them.
   static void draw_ahead(State& state, std::size_t active) {
+    constexpr std::size_t kFew = 4;
     if constexpr (Traits::kIgnoresMajorant || (Traits::kOwnFlights && !Traits::kDrawsExponentials)) return;
+    if (active <= kFew) return;
     for (std::size_t a = 0; a < active; ++a) state.ahead[a] = state.rng[state.active[a]].peek();
     negative_logarithms(state.ahead.data(), active, state.ahead.data());
     for (std::size_t a = 0; a < active; ++a) state.rng[state.active[a]].make_ready(state.ahead[a]);
