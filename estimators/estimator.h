@@ -82,10 +82,10 @@ namespace nullmark {
 //   static constexpr bool kDrawsExponentials
 //       with kOwnFlights: most steps draw an exponential first, so the loop takes the logarithms of a block together
 //   static constexpr bool kLanes = true
-//       walks run side by side in registers, in double and in float, of 3 and 4 channels in double: Walk holds only Value,
-//       Distance<Value> and Truth<Value>, which the loop no longer changes once a walk has ended;
+//       walks run side by side in registers, in double and in float, of 3 and 4 channels in double: Walk holds one to six Value,
+//       Distance<Value>, Truth<Value> or structs of them, which the loop no longer changes once a walk has ended;
 //       init, propose, consume and result take ray, flight and stream as auto, and branch by select() and flight.next(rng, alive)
-//       where walks can differ (see lane_kernel.h)
+//       where walks can differ (see lane_kernel.h).  flight.lookups() is one number for all walks of a register
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
 //       the harness fills exact_depth, knots, distance_at_depth, shares
 //

@@ -24,6 +24,7 @@ class ForcedRng {
  public:
   ForcedRng(std::uint64_t sample, int at, Real forced) : rng_(SampleAddress{20261122, 0, sample}), left_(at), forced_(forced) {}
 
+  Real uniform(bool) { return uniform(); }
   Real uniform() {
     const Real drawn = rng_.uniform();
     return left_-- == 0 ? forced_ : drawn;
@@ -114,7 +115,9 @@ void hold_in_float(const std::shared_ptr<const Medium>& medium) {
         Streams rng(state, true);
         typename LaneFlight<float, 1>::Rates rates;
         typename LaneFlight<float, 1>::Place place;
-        LaneFlight<float, 1> flight(rates, place);
+        std::uint32_t lookups = 0;
+        const auto in_flight = [&] { return LaneFlight<float, 1>(rates, place, lookups); };
+        LaneFlight<float, 1> flight = in_flight();
         typename E<Pack>::Walk walk;
         flight.start(walked.ray.majorant);
         tracker.init(walk, walked.ray, flight, rng);
@@ -128,14 +131,16 @@ void hold_in_float(const std::shared_ptr<const Medium>& medium) {
         };
         const auto goes_on = [&] {
           force();
-          return !none(LaneMask<float, 1>(tracker.propose(walk, walked.ray, flight, rng)));
+          LaneFlight<float, 1> there = in_flight();
+          return !none(LaneMask<float, 1>(tracker.propose(walk, walked.ray, there, rng)));
         };
         while (goes_on()) {
           float t;
           flight.position().store(&t);
+          ++lookups;
           ASSERT_TRUE(t >= 0 && t <= 1) << E<Real>::kName << " " << t;
           force();
-          tracker.consume(walk, walked.ray, flight, Pack(static_cast<float>(walked.extinction(t))), rng);
+          tracker.consume(walk, walked.ray, in_flight(), Pack(static_cast<float>(walked.extinction(t))), rng);
         }
         float result;
         Pack(tracker.result(walk, walked.ray)).store(&result);

@@ -23,6 +23,7 @@ struct Jackknife {
   static constexpr SampleRange kRange = SampleRange::any_sign;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kIgnoresMajorant = true;
+  static constexpr bool kLanes = true;
 
   int m = 2, steps = 10;
   std::string jitter = "stratified", mean = "jackknife";
@@ -45,11 +46,14 @@ struct Jackknife {
   }
 
   struct RayData : MediumRay<Value> {
+    std::uint32_t steps = 1, lookups = 0;  ///< of a march, of a sample
     Real step = 0;
     bool stratified = false, naive = false;
   };
 
   void prepare(RayData& ray) const {
+    ray.steps = static_cast<std::uint32_t>(steps);
+    ray.lookups = ray.length() > 0 ? static_cast<std::uint32_t>(m) * ray.steps : 0;
     ray.step = ray.length() / steps;
     ray.stratified = jitter == "stratified";
     ray.naive = mean == "naive";
@@ -57,38 +61,34 @@ struct Jackknife {
 
   struct Walk {
     Value sum, mean, squares;  ///< of the march at hand; over complete marches: Xbar and sum (X - Xbar)^2
-    Real offset = 0;
-    int done = 0, complete = 0;
+    Distance<Value> offset;
   };
 
-  void init(Walk& walk, const RayData& ray, Flight&, auto&) const {
-    walk.sum = walk.mean = walk.squares = ray.value(0);
-    walk.done = walk.complete = 0;
-  }
+  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(0), ray.value(0), ray.value(0), 0}; }
 
-  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
-    if (!(ray.step > 0) || walk.complete == m) return false;
-    if (ray.stratified || walk.done == 0) walk.offset = rng.uniform();
-    flight.jump(ray.begin + (walk.done + walk.offset) * ray.step);
+  bool propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    if (flight.lookups() == ray.lookups) return false;
+    const std::uint32_t j = flight.lookups() % ray.steps;
+    if (ray.stratified || j == 0) walk.offset = rng.uniform();
+    flight.jump(ray.begin + (j + walk.offset) * ray.step);
     return true;
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
     walk.sum += extinction;
-    if (++walk.done < steps) return;
+    if (at.lookups() % ray.steps != 0) return;
     const Value x = walk.sum * ray.step, ahead = x - walk.mean;
-    walk.mean += ahead / static_cast<Real>(++walk.complete);
+    walk.mean += ahead / static_cast<Real>(at.lookups() / ray.steps);
     walk.squares += ahead * (x - walk.mean);
     walk.sum = ray.value(0);
-    walk.done = 0;
   }
 
-  Value result(const Walk& walk, const RayData& ray) const {
-    Value transmittance = exponential(Value(-walk.mean));
-    if (!ray.naive)
-      for (int c = 0; c < ray.channels; ++c)
-        channel(transmittance, c) *= jackknife_factor(m, std::sqrt(std::max<Real>(0, channel(walk.squares, c) / m)));
-    return transmittance;
+  Value result(const Walk& walk, const auto& ray) const {
+    const Value naive = exponential(Value(-walk.mean));
+    if (ray.naive) return naive;
+    const Value deviation = signed_root(Value(larger(Value(walk.squares / m), 0)));
+    if (m == 2) return naive * cosine(Value(smaller(deviation, 30000)));  // Xbar is no less, and e^{-Xbar} is 0 beyond
+    return naive * one_by_one(deviation, [this](Real s) { return jackknife_factor(m, s); });
   }
 
   Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {

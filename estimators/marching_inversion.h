@@ -12,28 +12,35 @@ struct MarchingInversion : RayMarching<Value> {
   static constexpr const char* kName = "marching_inversion";
   static constexpr const char* kSummary = "free paths by inverting the optical depth of a march, linearly in each step";
   static constexpr const char* kSource = "Perlin and Hoffert 1989";
-  static constexpr bool kLanes = false;
 
   using Base = RayMarching<Value>;
   using RayData = typename Base::RayData;
 
-  struct Walk : Base::Walk {
-    Real target = 0, distance = kInfinity;
+  struct Walk {
+    typename Base::Walk march;
+    Distance<Value> target, distance;  ///< optical depth sampled; where the march's sums pass it
   };
 
-  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
-    Base::init(walk, ray, flight, rng);
+  void init(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    Base::init(walk.march, ray, flight, rng);
     walk.target = rng.exponential();
     walk.distance = kInfinity;
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Real before = channel(walk.sum, 0) * ray.step;
-    Base::consume(walk, ray, at, extinction, rng);
-    const Real after = channel(walk.sum, 0) * ray.step;
-    if (walk.distance < kInfinity || !(walk.target < after)) return;
-    walk.distance = ray.begin + (walk.done - 1 + (walk.target - before) / (after - before)) * ray.step;
+  bool propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const { return Base::propose(walk.march, ray, flight, rng); }
+
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
+    const Distance<Value> before = channel(walk.march.sum, 0) * ray.step;
+    Base::consume(walk.march, ray, at, extinction, rng);
+    const Distance<Value> after = channel(walk.march.sum, 0) * ray.step;
+    const auto passed = (walk.target < after) & !(walk.distance < kInfinity);
+    if (none(passed)) return;
+    const Distance<Value> passing = at.lookups() - 1 + (walk.target - before) / (after - before);
+    walk.distance = select(passed, ray.begin + passing * ray.step, walk.distance);
   }
+
+  Value optical_depth(const Walk& walk, const auto& ray) const { return Base::optical_depth(walk.march, ray); }
+  Value result(const Walk& walk, const auto& ray) const { return Base::result(walk.march, ray); }
 
   bool samples_events(int channels) const { return channels == 1; }
 

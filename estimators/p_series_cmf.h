@@ -17,8 +17,11 @@ struct PowerSeriesCmf {
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kLanes = true;
 
   static constexpr Real kShare = 0.99;
+  /// In float a thinner ray may be empty; no term but the zeroth counts.
+  static constexpr Real kThinnest = 0x1p-100;
   /// Beyond it a walk takes more lookups than one may.
   static constexpr Real kDeepest = 0x1p31;
 
@@ -26,46 +29,51 @@ struct PowerSeriesCmf {
 
   struct RayData : MediumRay<Value> {
     PoissonTail tail;
-    std::int64_t always = 0;  ///< n0
+    Real always = 0;  ///< n0
   };
 
   void prepare(RayData& ray) const {
     ray.always = 0;
     if (!(ray.majorant.total_depth() < kDeepest)) return;
     ray.tail.set_up(ray.majorant.total_depth());
-    ray.always = ray.majorant.total_depth() > 0 ? ray.tail.first_at_most(1 - kShare) : 0;
+    ray.always = ray.majorant.total_depth() > kThinnest ? static_cast<Real>(ray.tail.first_at_most(1 - kShare)) : 0;
   }
 
-  using Walk = SeriesWalk<Value>;
+  struct Walk {
+    SeriesSum<Value> series;
+    Distance<Value> u;  ///< uniform, given that the walk has come so far
+  };
 
-  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const { walk.start(ray, rng); }
-
-  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
-    if (++walk.lookups > ray.always) {
-      const Real chance = ray.majorant.total_depth() / static_cast<Real>(walk.lookups);
-      if (!(walk.u < chance)) return false;
-      walk.u /= chance;
-    }
-    land_anywhere(ray, flight, rng);
-    return true;
+  void init(Walk& walk, const auto& ray, auto&, auto& rng) const {
+    walk.series.start(ray);
+    walk.u = uniform_above_zero<Value>(rng);
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto&) const {
-    const Real factor = walk.lookups > ray.always ? 1 : ray.majorant.total_depth() / static_cast<Real>(walk.lookups);
-    walk.series.multiply(factor * null_ratio(at, extinction));
-    walk.series.add();
+  auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    const std::uint32_t i = flight.lookups() + 1;
+    const Real chance = i > ray.always ? ray.majorant.total_depth() / i : 1;
+    const auto goes_on = walk.u < chance;
+    if (none(goes_on)) return goes_on;
+    walk.u = walk.u / chance;
+    land_anywhere(ray, flight, rng, goes_on);
+    return goes_on;
   }
 
-  Value result(const Walk& walk, const RayData&) const { return walk.series.total(); }
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
+    const Real factor = at.lookups() > ray.always ? 1 : ray.majorant.total_depth() / at.lookups();
+    walk.series.multiply(ray, factor * null_ratio(at, extinction));
+    walk.series.add(1);
+  }
+
+  Value result(const Walk& walk, const auto&) const { return walk.series.total; }
 
   Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     if (!(ray.majorant.total_depth() < kDeepest)) return {.lookups = ray.majorant.total_depth()};
     const SeriesMoments moments = series_moments(ray, profile, c);
-    const auto always = static_cast<Real>(ray.always);
+    const Real always = ray.always;
     const auto log_growth = [&](std::int64_t n) {
       const auto i = static_cast<Real>(n);
-      const Real log_chance =
-          n > ray.always ? (i - always) * std::log(moments.depth) - log_factorial(i) + log_factorial(always) : 0;
+      const Real log_chance = i > always ? (i - always) * std::log(moments.depth) - log_factorial(i) + log_factorial(always) : 0;
       return i * std::log1p(moments.spread) - log_chance;
     };
     Real more = 0, squares = 0, chance = 1;

@@ -21,36 +21,40 @@ struct PowerSeriesCumulative {
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kLanes = true;
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Walk : SeriesWalk<Value> {
-    bool done = false;
+  struct Walk {
+    SeriesSum<Value> series;
+    Distance<Value> u;  ///< uniform, given that the walk has come so far
+    Truth<Value> done;
   };
 
-  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto& rng) const {
-    walk.start(ray, rng);
-    walk.done = !(ray.majorant.total_depth() > 0);
+  void init(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    walk.series.start(ray);
+    walk.u = uniform_above_zero<Value>(rng);
+    walk.done = !(flight.total_depth() > 0);
   }
 
-  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
-    if (walk.done) return false;
-    ++walk.lookups;
-    land_anywhere(ray, flight, rng);
-    return true;
+  auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    const auto goes_on = !walk.done;
+    if (none(goes_on)) return goes_on;
+    land_anywhere(ray, flight, rng, goes_on);
+    return goes_on;
   }
 
-  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto&) const {
-    walk.series.multiply(ray.majorant.total_depth() / static_cast<Real>(walk.lookups) * null_ratio(at, extinction));
-    const Real chance = walk.series.magnitude_to_one();
-    walk.done = !(walk.u < chance);
-    if (walk.done) return;
-    walk.u /= chance;
-    walk.series.divide(chance);
-    walk.series.add();
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
+    walk.series.multiply(ray, ray.majorant.total_depth() / at.lookups() * null_ratio(at, extinction));
+    const Distance<Value> chance = walk.series.magnitude_to_one();
+    const auto goes_on = walk.u < chance;
+    walk.done = !goes_on;
+    walk.u = walk.u / chance;
+    walk.series.at.weight = walk.series.at.weight / select(goes_on, chance, Distance<Value>(1));
+    walk.series.add(select(goes_on, Distance<Value>(1), Distance<Value>(kInfinity)));
   }
 
-  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.series.total(); }
+  Value result(const Walk& walk, const auto&) const { return walk.series.total; }
 
   Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     if (!(ray.majorant.total_depth() > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};

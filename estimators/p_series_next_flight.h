@@ -17,6 +17,7 @@ struct PowerSeriesNextFlight {
   static constexpr SampleRange kRange = SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kLanes = true;
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
@@ -26,23 +27,28 @@ struct PowerSeriesNextFlight {
 
   void prepare(RayData& ray) const { ray.tail.set_up(ray.majorant.total_depth()); }
 
-  using Walk = SeriesWalk<Value>;
+  struct Walk {
+    SeriesSum<Value> series;
+    Distance<Value> u;  ///< uniform
+  };
 
-  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const { walk.start(ray, rng); }
-
-  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
-    if (!(walk.u < ray.tail.at_least(walk.lookups + 1))) return false;
-    ++walk.lookups;
-    land_anywhere(ray, flight, rng);
-    return true;
+  void init(Walk& walk, const auto& ray, auto&, auto& rng) const {
+    walk.series.start(ray);
+    walk.u = uniform_above_zero<Value>(rng);
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto&) const {
-    walk.series.multiply(ray.majorant.total_depth() / static_cast<Real>(walk.lookups) * null_ratio(at, extinction));
-    walk.series.add(ray.tail.at_least(walk.lookups));
+  auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    const auto goes_on = walk.u < ray.tail.at_least(flight.lookups() + 1);
+    if (!none(goes_on)) land_anywhere(ray, flight, rng, goes_on);
+    return goes_on;
   }
 
-  Value result(const Walk& walk, const RayData&) const { return walk.series.total(); }
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
+    walk.series.multiply(ray, ray.majorant.total_depth() / at.lookups() * null_ratio(at, extinction));
+    walk.series.add(ray.tail.at_least(at.lookups()));
+  }
+
+  Value result(const Walk& walk, const auto&) const { return walk.series.total; }
 
   Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     const SeriesMoments moments = series_moments(ray, profile, c);

@@ -17,6 +17,7 @@ struct PowerSeriesRatio {
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kOwnFlights = true;
+  static constexpr bool kLanes = true;
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
@@ -28,23 +29,22 @@ struct PowerSeriesRatio {
 
   struct Walk {
     Value weight;
-    Real u = 0;
-    std::int64_t lookups = 0;
+    Distance<Value> u;  ///< uniform
   };
 
-  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const { walk = {ray.value(1), rng.uniform(), 0}; }
+  void init(Walk& walk, const auto& ray, auto&, auto& rng) const { walk = {ray.value(1), uniform_above_zero<Value>(rng)}; }
 
-  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
-    if (!(walk.u < ray.tail.at_least(++walk.lookups))) return false;
-    land_anywhere(ray, flight, rng);
-    return true;
+  auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    const auto goes_on = walk.u < ray.tail.at_least(flight.lookups() + 1);
+    if (!none(goes_on)) land_anywhere(ray, flight, rng, goes_on);
+    return goes_on;
   }
 
-  void consume(Walk& walk, const RayData&, const Flight& at, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
     walk.weight *= null_ratio(at, extinction);
   }
 
-  Value result(const Walk& walk, const RayData&) const { return walk.weight; }
+  Value result(const Walk& walk, const auto&) const { return walk.weight; }
 
   CountLaw count_law(const RayData& ray, const RayProfile& profile, int c) const {
     return RatioTracking<Value>().count_law(ray, profile, c);

@@ -32,7 +32,7 @@ void PoissonTail::set_up(Real mean) {
     tail_[i] = tail;
   }
   const Real whole = low > 0 ? tail + first : 1;
-  for (Real& x : tail_) x = std::min<Real>(1, x / whole);
+  for (Real& x : tail_) x = x > kNothing * whole ? std::min<Real>(1, x / whole) : 0;
 }
 
 std::int64_t PoissonTail::first_at_most(Real chance) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -13,71 +14,77 @@ namespace nullmark {
 // uniform in majorant depth, in no order, whatever the cells.  So W_i = prod_{k<=i} (M/k) a(x_k) has mean (int (mub - mu))^i /
 // i!, and the trackers differ in the chance P_i with which they get to term i, which divides it.
 
-/// The next lookup: a point uniform in majorant depth.
+/// The uniform number of a walk that goes on while it is below a chance.  At 0 the walk would go on whatever the chance, so a 0
+/// is taken for half the least number above it.
 template <class Value>
-void land_anywhere(const MediumRay<Value>& ray, Flight& flight, auto& rng) {
-  flight.start(ray.majorant);
-  if (!flight.advance_to(rng.uniform() * ray.majorant.total_depth())) flight.advance_to(0);  // denormal depths round up
+Distance<Value> uniform_above_zero(auto& rng) {
+  return larger(rng.uniform(), Distance<Value>(kInFloat<Value> ? 0x1p-25 : 0x1p-54));
+}
+
+/// The next lookup of the walks that go on: a point uniform in majorant depth.
+template <class GoesOn>
+[[gnu::always_inline]] inline void land_anywhere(const auto& ray, auto& flight, auto& rng, const GoesOn& goes_on) {
+  const auto depth = rng.uniform(goes_on) * ray.majorant.total_depth();
+  flight.go_back();
+  const auto inside = flight.advance_to(depth);
+  if (none(!inside)) return;
+  flight.go_back();  // denormal depths round up
+  flight.advance_to(select(inside, depth, decltype(depth)(0)));
 }
 
 /// e^{-M} (W_0 + W_1 + ...), W_0 = 1.  W may pass e^M, and e^{-M} is 0 from M = 746 on, so W is kept as a number near 1 times a
 /// power of 2, which a term's e^{-M} takes in: a term underflows where it is 0 in double, and none overflows.
 template <class Value>
-class SeriesSum {
- public:
-  void start(const MediumRay<Value>& ray) {
-    weight_ = ray.value(1);
-    sum_ = ray.value(0);
-    scale_ = 0;
-    depth_ = ray.majorant.total_depth();
-    factor_ = exponential(-depth_);
-    add();
+struct SeriesSum {
+  /// W = weight * 2^(64 scale), scale >= 0; factor = e^{-M} 2^(64 scale).
+  struct Scaled {
+    Value weight;
+    Distance<Value> factor, scale;
+  };
+  Scaled at;
+  Value total;
+
+  void start(const auto& ray) {
+    at = {ray.value(1), factor(0, ray.majorant.total_depth()), 0};
+    total = at.weight * at.factor;
   }
 
   /// W *= by; powers of 2 are exact, so W is the same however it is kept.
-  void multiply(const Value& by) {
-    weight_ *= by;
-    const Real most = largest(Value(magnitude(weight_)));
-    if (most > kBig || (scale_ > 0 && most < 1 / kBig)) rescale(most);
+  void multiply(const auto& ray, const Value& by) {
+    at.weight *= by;
+    const Distance<Value> most = largest(Value(magnitude(at.weight)));
+    if (!none((most > kBig) | ((at.scale > 0) & (most < 1 / kBig)))) at = rescaled(at, ray.majorant.total_depth());
   }
 
-  /// Adds e^{-M} W / `chance`; one near the least number is that of a W as small.
-  void add(Real chance = 1) {
-    sum_ += chance < least_normal(chance) ? Value(weight_ / chance * factor_) : Value(weight_ * (factor_ / chance));
+  /// Adds e^{-M} W / `chance`.
+  void add(const Distance<Value>& chance) { total += at.weight * (at.factor / chance); }
+
+  /// min(1, |W|), the largest channel's; no number where W is none.
+  Distance<Value> magnitude_to_one() const {
+    const Distance<Value> most = largest(Value(magnitude(at.weight)));
+    return select((most > 1) | (at.scale > 0), Distance<Value>(1), most);
   }
-
-  void divide(Real by) { weight_ /= by; }
-
-  /// min(1, |W|), the largest channel's.
-  Real magnitude_to_one() const { return scale_ > 0 ? 1 : std::min<Real>(1, largest(Value(magnitude(weight_)))); }
-
-  const Value& total() const { return sum_; }
 
  private:
   static constexpr Real kBig = 0x1p64, kLogBig = 44.36141955583649979;  // 64 log 2
 
-  void rescale(Real most) {
-    for (; most > kBig && most < kInfinity; most /= kBig, ++scale_) weight_ /= kBig;
-    for (; most < 1 / kBig && scale_ > 0; most *= kBig, --scale_) weight_ *= kBig;
-    factor_ = exponential(scale_ * kLogBig - depth_);
+  /// e^{-M} 2^(64 scale).  In float what is no normal number is 0: a CPU takes hundreds of cycles for others.
+  static Real factor(Real scale, Real depth) {
+    const Real factor = exponential(scale * kLogBig - depth);
+    return kInFloat<Value> && factor < 0x1p-126 ? 0 : factor;
   }
 
-  Value weight_, sum_;
-  Real factor_ = 0, depth_ = 0;
-  int scale_ = 0;  ///< W = weight * 2^(64 scale), scale >= 0
-};
-
-/// What walks that sum terms have in common.
-template <class Value>
-struct SeriesWalk {
-  SeriesSum<Value> series;
-  Real u = 0;  ///< uniform, given that the walk has come so far
-  std::int64_t lookups = 0;
-
-  void start(const MediumRay<Value>& ray, auto& rng) {
-    series.start(ray);
-    u = rng.uniform();
-    lookups = 0;
+  /// Powers of 2 go over between weight and factor.  By value: what a call could reach would not stay in registers.
+  [[gnu::noinline]] static Scaled rescaled(Scaled at, Real depth) {
+    for (;;) {
+      const Distance<Value> most = largest(Value(magnitude(at.weight)));
+      const auto large = (most > kBig) & (most < kInfinity), small = (most < 1 / kBig) & (at.scale > 0);
+      if (none(large | small)) break;
+      at.weight *= select(large, Distance<Value>(1 / kBig), select(small, Distance<Value>(kBig), Distance<Value>(1)));
+      at.scale += select(large, Distance<Value>(1), select(small, Distance<Value>(-1), Distance<Value>(0)));
+    }
+    at.factor = one_by_one(at.scale, [&](Real scale) { return factor(scale, depth); });
+    return at;
   }
 };
 

@@ -314,12 +314,13 @@ TEST(PowerSeries, ScalingChangesNoDigitWhereNothingOverflows) {
     const Real depth = hand.ray.majorant.total_depth();
     Real u = one.uniform(), w = 1, s = 1;
     for (std::int64_t i = 1;; ++i) {
-      if (i > hand.ray.always) {
+      const bool always = static_cast<Real>(i) <= hand.ray.always;
+      if (!always) {
         if (!(u < depth / static_cast<Real>(i))) break;
         u /= depth / static_cast<Real>(i);
       }
       const Real x = one.uniform();
-      w *= (i > hand.ray.always ? 1 : depth / static_cast<Real>(i)) * (1 - (0.2 + 1.6 * x) / depth);
+      w *= (!always ? 1 : depth / static_cast<Real>(i)) * (1 - (0.2 + 1.6 * x) / depth);
       s += w;
     }
     const Real result = hand.walk(other).result;

@@ -41,11 +41,13 @@ struct RayMarching {
   }
 
   struct RayData : MediumRay<Value> {
+    std::uint32_t steps = 0;
     Real step = 0, fixed = 0;
     bool uniform = false, stratified = false;
   };
 
   void prepare(RayData& ray) const {
+    ray.steps = static_cast<std::uint32_t>(steps);
     ray.step = ray.length() / steps;
     ray.fixed = offset == "left" ? 0 : offset == "right" ? 1 : 0.5;
     ray.uniform = offset == "uniform";
@@ -54,21 +56,19 @@ struct RayMarching {
 
   struct Walk {
     Value sum;
-    Distance<Value> offset = 0, done = 0;
+    Distance<Value> offset = 0;
   };
 
   void init(Walk& walk, const auto& ray, auto&, auto& rng) const {
-    walk = {ray.value(0), ray.fixed, 0};
+    walk = {ray.value(0), ray.fixed};
     if (ray.uniform) walk.offset = rng.uniform();
   }
 
-  auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
-    const auto goes_on = walk.done < (ray.step > 0 ? steps : 0);
-    if (none(goes_on)) return goes_on;
+  bool propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    if (!(ray.step > 0) || flight.lookups() == ray.steps) return false;
     if (ray.stratified) walk.offset = rng.uniform();
-    flight.jump(ray.begin + (walk.done + walk.offset) * ray.step);
-    walk.done += 1;
-    return goes_on;
+    flight.jump(ray.begin + (flight.lookups() + walk.offset) * ray.step);
+    return true;
   }
 
   void consume(Walk& walk, const auto&, const auto&, const Value& extinction, auto&) const { walk.sum += extinction; }

@@ -22,6 +22,7 @@ struct Telescoping {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kIgnoresMajorant = true;
   static constexpr bool kHeavyLookups = true;
+  static constexpr bool kLanes = true;
 
   Real r = 0.65;
 
@@ -32,43 +33,43 @@ struct Telescoping {
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
-  struct Walk {
-    Value base, even, odd;  ///< sums of e^{-v_i}, and of mu at even and at odd i
-    Real offset = 0, done = 0, count = 0, probability = 1;
+  struct RayData : MediumRay<Value> {
+    Real log_rest = 0;  ///< log (1 - r)
   };
 
-  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto& rng) const {
+  void prepare(RayData& ray) const { ray.log_rest = std::log1p(-r); }
+
+  struct Walk {
+    Value base, even, odd;          ///< sums of e^{-v_i}, and of mu at even and at odd i
+    Distance<Value> offset, level;  ///< n
+    Distance<Value> count;          ///< 2^{n+1}
+  };
+
+  void init(Walk& walk, const auto& ray, auto&, auto& rng) const {
     walk.base = walk.even = walk.odd = ray.value(0);
-    const Real n = std::floor(rng.exponential() / -std::log1p(-r));
-    walk.count = std::exp2(n + 1);
-    walk.probability = r * std::pow(1 - r, n);
+    walk.level = rounded_down(rng.exponential() / -ray.log_rest);
+    walk.count = power_of_two(walk.level + 1);
     walk.offset = rng.uniform();
-    walk.done = 0;
   }
 
-  bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto&) const {
-    if (!(ray.length() > 0) || walk.done == walk.count) return false;
-    flight.jump(ray.begin + (walk.offset + walk.done) / walk.count * ray.length());
-    return true;
+  auto propose(Walk& walk, const auto& ray, auto& flight, auto&) const {
+    flight.jump(ray.begin + (walk.offset + flight.lookups()) / walk.count * ray.length());
+    return walk.count > (ray.length() > 0 ? flight.lookups() : kInfinity);
   }
 
-  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight&, const Value& extinction, auto&) const {
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
     walk.base += exponential(Value(-extinction * ray.length()));
-    (std::fmod(walk.done, 2) == 0 ? walk.even : walk.odd) += extinction;
-    ++walk.done;
+    (at.lookups() % 2 == 1 ? walk.even : walk.odd) += extinction;
   }
 
-  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
+  Value result(const Walk& walk, const auto& ray) const {
     if (!(ray.length() > 0)) return ray.value(1);
-    const Real of_half = ray.length() / (walk.count / 2);
-    Value transmittance = walk.base / walk.count;
-    for (int c = 0; c < ray.channels; ++c)
-      channel(transmittance, c) +=
-          march_difference(channel(walk.even, c) * of_half, channel(walk.odd, c) * of_half) / walk.probability;
-    return transmittance;
+    const Distance<Value> of_half = ray.length() / (walk.count * .5);
+    const Distance<Value> chance = r * exponential(walk.level * ray.log_rest);
+    return walk.base / walk.count + march_difference(Value(walk.even * of_half), Value(walk.odd * of_half)) / chance;
   }
 
-  Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
+  Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {
     if (!(ray.length() > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
     const Real squares = 4 * (1 - r) < 1 ? 4 * r / (1 - 4 * (1 - r)) : kInfinity;
     const Real lookups = 2 * r / (2 * r - 1);

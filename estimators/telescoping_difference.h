@@ -21,6 +21,7 @@ struct TelescopingDifference {
   static constexpr bool kNeedsBound = false;
   static constexpr bool kIgnoresMajorant = true;
   static constexpr bool kGreyOnly = true;
+  static constexpr bool kLanes = true;
 
   int level = 0;
   std::string marches = "correlated";
@@ -44,35 +45,29 @@ struct TelescopingDifference {
 
   struct Walk {
     Value first, second;  ///< sums of mu: over even and odd lookups, or of the finer and the coarser march
-    Real offset = 0, done = 0;
+    Distance<Value> offset;
   };
 
-  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const { walk = {ray.value(0), ray.value(0), rng.uniform(), 0}; }
+  void init(Walk& walk, const auto& ray, auto&, auto& rng) const { walk = {ray.value(0), ray.value(0), rng.uniform()}; }
 
-  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
-    const Real fine = ray.steps, all = ray.correlated ? fine : 1.5 * fine;
-    if (!(ray.length() > 0) || walk.done == all) return false;
-    if (walk.done == fine) walk.offset = rng.uniform();
-    const Real at = walk.done < fine ? (walk.offset + walk.done) / fine : (walk.offset + walk.done - fine) / (fine / 2);
+  bool propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    const Real done = flight.lookups(), fine = ray.steps, all = ray.correlated ? fine : 1.5 * fine;
+    if (!(ray.length() > 0) || done == all) return false;
+    if (done == fine) walk.offset = rng.uniform();
+    const Distance<Value> at = done < fine ? (walk.offset + done) / fine : (walk.offset + (done - fine)) / (fine / 2);
     flight.jump(ray.begin + at * ray.length());
     return true;
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight&, const Value& extinction, auto&) const {
-    const bool to_first = ray.correlated ? std::fmod(walk.done, 2) == 0 : walk.done < ray.steps;
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
+    const bool to_first = ray.correlated ? at.lookups() % 2 == 1 : at.lookups() <= ray.steps;
     (to_first ? walk.first : walk.second) += extinction;
-    ++walk.done;
   }
 
-  Value result(const Walk& walk, const RayData& ray) const {
-    Value difference = ray.value(0);
+  Value result(const Walk& walk, const auto& ray) const {
     const Real coarse = ray.length() / (ray.steps / 2), fine = ray.length() / ray.steps;
-    for (int c = 0; c < ray.channels; ++c) {
-      const Real first = channel(walk.first, c), second = channel(walk.second, c);
-      channel(difference, c) = ray.correlated ? march_difference(first * coarse, second * coarse)
-                                              : std::exp(-first * fine) - std::exp(-second * coarse);
-    }
-    return difference;
+    if (ray.correlated) return march_difference(Value(walk.first * coarse), Value(walk.second * coarse));
+    return exponential(Value(-walk.first * fine)) - exponential(Value(-walk.second * coarse));
   }
 };
 

@@ -45,7 +45,8 @@ struct UnbiasedRayMarching {
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   struct RayData : MediumRay<Value> {
-    Real steps = 0, step = 0;  ///< M and h; M = 0 where there is nothing to look up
+    Real steps = 0, step = 0;   ///< M and h; M = 0 where there is nothing to look up
+    std::uint32_t lookups = 0;  ///< M, where a walk may take as many
   };
 
   void prepare(RayData& ray) const {
@@ -59,54 +60,54 @@ struct UnbiasedRayMarching {
     const Real lookups = std::ceil(std::cbrt((.015 + thickness) * (.65 + thickness) * (60.3 + thickness)));
     ray.steps = std::max<Real>(1, std::floor(lookups / (1 + kMeanOrder) + .5));
     ray.step = ray.length() / ray.steps;
+    ray.lookups = static_cast<std::uint32_t>(std::min<Real>(ray.steps, std::numeric_limits<std::uint32_t>::max()));
   }
 
   struct Walk {
     std::array<Value, kMostOrder + 1> march;  ///< -h sum mu, of those that are complete
     Value sum, trend;                         ///< of the march at hand; mu(d) - mu(0)
-    Real offset = 0, done = 0;
-    int order = 0, complete = 0, ends = 0;
+    Real offset = 0;
+    std::uint32_t before = 0;  ///< lookups before that march
+    int order = 0, complete = 0;
   };
 
   void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const {
     walk.sum = walk.trend = ray.value(0);
-    walk.done = 0;
-    walk.order = walk.complete = walk.ends = 0;
+    walk.before = endpoint_matching ? 2 : 0;
+    walk.order = walk.complete = 0;
     if (rng.uniform() < .1)
       for (walk.order = 2; walk.order < kMostOrder && rng.uniform() * (walk.order + 1) < 2;) ++walk.order;
   }
 
   bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
     if (!(ray.steps > 0) || walk.complete > walk.order) return false;
-    if (endpoint_matching && walk.ends < 2) {
-      flight.jump(walk.ends == 0 ? ray.begin : ray.end);
+    if (endpoint_matching && flight.lookups() < 2) {
+      flight.jump(flight.lookups() == 0 ? ray.begin : ray.end);
       return true;
     }
-    if (walk.done == 0) walk.offset = rng.uniform();
-    flight.jump(ray.begin + (walk.offset + walk.done) * ray.step);
+    const std::uint32_t done = flight.lookups() - walk.before;
+    if (done == 0) walk.offset = rng.uniform();
+    flight.jump(ray.begin + (walk.offset + done) * ray.step);
     return true;
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight&, const Value& extinction, auto&) const {
-    if (endpoint_matching && walk.ends < 2) {
+  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto&) const {
+    if (endpoint_matching && at.lookups() <= 2) {
       walk.trend = extinction - walk.trend;
-      ++walk.ends;
       return;
     }
     walk.sum += extinction;
-    if (++walk.done < ray.steps) return;
+    if (at.lookups() - walk.before < ray.lookups) return;
     walk.march[static_cast<std::size_t>(walk.complete++)] = (walk.trend * (walk.offset - .5) - walk.sum) * ray.step;
     walk.sum = ray.value(0);
-    walk.done = 0;
+    walk.before = at.lookups();
   }
 
   Value result(const Walk& walk, const RayData& ray) const {
     if (!(ray.steps > 0)) return ray.value(1);
     // So long a series comes up once in 10^27 samples; cut short it would be wrong, so that it counts as an error.
     if (walk.order == kMostOrder) return ray.value(std::numeric_limits<Real>::quiet_NaN());
-    Value transmittance = ray.value(0);
-    for (int c = 0; c < ray.channels; ++c) channel(transmittance, c) = series(walk, c);
-    return transmittance;
+    return series(walk, ray);
   }
 
   /// The variance is that of the series over the comb's own law.  Nothing where that takes too many lookups, or orders.
@@ -119,28 +120,28 @@ struct UnbiasedRayMarching {
   }
 
  private:
-  static Real series(const Walk& walk, int c) {
-    const auto x = [&](int i) { return channel(walk.march[static_cast<std::size_t>(i)], c); };
-    const int n = walk.order;
-    Real sum = 0;
-    for (int pivot = 0; pivot <= n; ++pivot) {
-      const Real scale = exponential(x(pivot));
-      if (scale == 0) continue;
-      std::array<Real, kMostOrder + 1> mean{1};
-      int q = 0;
-      for (int i = 0; i <= n; ++i) {
+  static Value series(const Walk& walk, const RayData& ray) {
+    const auto n = static_cast<std::size_t>(walk.order);
+    Value sum = ray.value(0);
+    for (std::size_t pivot = 0; pivot <= n; ++pivot) {
+      const Value scale = exponential(walk.march[pivot]);
+      if (vanished(scale)) continue;
+      std::array<Value, kMostOrder + 1> mean;
+      std::fill_n(mean.begin(), n + 1, ray.value(0));
+      mean[0] = ray.value(1);
+      std::size_t q = 0;
+      for (std::size_t i = 0; i <= n; ++i) {
         if (i == pivot) continue;
         ++q;
-        for (int k = q; k > 0; --k) {
-          const auto at = static_cast<std::size_t>(k);
-          mean[at] += static_cast<Real>(k) / q * (mean[at - 1] * (x(i) - x(pivot)) - mean[at]);
-        }
+        for (std::size_t k = q; k > 0; --k)
+          mean[k] += static_cast<Real>(k) / static_cast<Real>(q) * (mean[k - 1] * (walk.march[i] - walk.march[pivot]) - mean[k]);
       }
-      Real terms = 1, twentieth = .05;  // k! P_k
-      for (int k = 1; k <= n; ++k) terms += mean[static_cast<std::size_t>(k)] / (twentieth *= 2);
-      sum += scale * terms;
+      Value terms = ray.value(1);
+      Real twentieth = .05;  // k! P_k
+      for (std::size_t k = 1; k <= n; ++k) terms += mean[k] / (twentieth *= 2);
+      sum += select(scale > 0, scale * terms, ray.value(0));
     }
-    return sum / (n + 1);
+    return sum / static_cast<Real>(n + 1);
   }
 };
 

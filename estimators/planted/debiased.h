@@ -23,7 +23,7 @@ struct PlantedSharedOffset : UnbiasedRayMarching<Value> {
     if (!Base::propose(walk, ray, flight, rng)) return false;
     if (walk.complete > 0) {
       walk.offset = before;
-      flight.jump(ray.begin + (walk.offset + walk.done) * ray.step);
+      flight.jump(ray.begin + (walk.offset + (flight.lookups() - walk.before)) * ray.step);
     }
     return true;
   }
@@ -41,14 +41,15 @@ struct PlantedUnweightedLevel : Telescoping<Value> {
   static constexpr const char* kCaughtBy = "mean";
 
   using Base = Telescoping<Value>;
+  using RayData = typename Base::RayData;
   using Walk = typename Base::Walk;
 
-  void init(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto& rng) const {
-    Base::init(walk, ray, flight, rng);
-    walk.probability /= this->r;
+  Value result(const Walk& walk, const RayData& ray) const {
+    const Value base = walk.base / walk.count;
+    return base + (Base::result(walk, ray) - base) * this->r;
   }
 
-  Theory theory(const MediumRay<Value>&, const RayProfile&, int, Quantity) const { return {}; }
+  Theory theory(const RayData&, const RayProfile&, int, Quantity) const { return {}; }
 };
 
 /// Majorant-guided ratio tracking that leaves the last flight's weight e^{(q - 1)(M - s)} out.

@@ -24,17 +24,15 @@ struct PlantedMidpoint {
   struct Walk {
     Value sum;
     Real offset = 0;
-    int done = 0;
   };
 
   void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto& rng) const {
-    walk = {ray.value(0), 0.5 + kJitter * (rng.uniform() - 0.5), 0};
+    walk = {ray.value(0), 0.5 + kJitter * (rng.uniform() - 0.5)};
   }
 
   bool propose(Walk& walk, const MediumRay<Value>& ray, Flight& flight, auto&) const {
-    if (!(ray.length() > 0) || walk.done == kSteps) return false;
-    flight.jump(ray.begin + (walk.done + walk.offset) * ray.length() / kSteps);
-    ++walk.done;
+    if (!(ray.length() > 0) || flight.lookups() == kSteps) return false;
+    flight.jump(ray.begin + (flight.lookups() + walk.offset) * ray.length() / kSteps);
     return true;
   }
 

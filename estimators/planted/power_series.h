@@ -16,8 +16,8 @@ struct PlantedStrictTail : PowerSeriesNextFlight<Value> {
 
   void consume(typename PowerSeriesNextFlight<Value>::Walk& walk, const RayData& ray, const Flight& at, const Value& extinction,
                auto&) const {
-    walk.series.multiply(ray.majorant.total_depth() / static_cast<Real>(walk.lookups) * null_ratio(at, extinction));
-    walk.series.add(ray.tail.at_least(walk.lookups + 1));
+    walk.series.multiply(ray, ray.majorant.total_depth() / at.lookups() * null_ratio(at, extinction));
+    walk.series.add(ray.tail.at_least(at.lookups() + 1));
   }
 };
 

@@ -15,6 +15,13 @@ inline Real march_difference(Real even, Real odd) {
   return -exponential(-std::min(even, odd)) * closer * closer / 2;
 }
 
+/// Of each channel and walk.
+template <class Value>
+[[gnu::always_inline]] inline Value march_difference(const Value& even, const Value& odd) {
+  const Value closer = one_minus_exponential(Value(magnitude(Value(even - odd)) * -.5));
+  return -exponential(Value(-smaller(even, odd))) * closer * closer * .5;
+}
+
 /// Gamma(nu + 1) (2/S)^nu J_nu(S), nu = (m - 3)/2: cos S, J_0(S), sin S/S for m = 2, 3, 4.  What makes e^{-Xbar} of m normal
 /// numbers unbiased, S^2 = mean X^2 - Xbar^2 [Peters 2025].
 Real jackknife_factor(int m, Real s);

@@ -13,12 +13,29 @@ namespace nullmark {
 /// follow the same law.  Cells of rate 0 are passed over without a draw; a ray that has no other costs one.
 class Flight {
  public:
+  /// Begins a walk.
+  void set_out(const Rates& rates) {
+    lookups_ = 0;
+    start(rates);
+  }
+  void set_lookups(std::uint32_t lookups) { lookups_ = lookups; }
+
+  /// Lookups that the loop has made for this walk.  In lanes too it is one number: the walks of a block look up together, and
+  /// those that have ended ask no more.
+  std::uint32_t lookups() const { return lookups_; }
+
+  /// Begins anew, on rates of the estimator's own.
   void start(const Rates& rates) {
     rates_ = &rates;
-    piece_ = 0;
     collisions_ = 0;
+    go_back();
+  }
+
+  /// Back to the ray's begin, on the same rates.
+  void go_back() {
+    piece_ = 0;
     depth_ = 0;
-    position_ = rates.begin();
+    position_ = rates_->begin();
   }
 
   /// Moves to the next tentative collision; false when it lies beyond the ray's end, or where the walk is not `alive`.
@@ -86,7 +103,7 @@ class Flight {
 
   const Rates* rates_ = nullptr;
   std::size_t piece_ = 0;
-  std::uint32_t collisions_ = 0;
+  std::uint32_t collisions_ = 0, lookups_ = 0;
   Real depth_ = 0, position_ = 0;
 };
 

@@ -64,12 +64,17 @@ class LaneFlight {
   using Rates = LaneRates<T, N>;
   using Place = LanePlace<T, N>;
 
-  LaneFlight(Rates& rates, Place& at) : rates_(rates), at_(at) {}
+  LaneFlight(Rates& rates, Place& at, std::uint32_t lookups) : rates_(rates), at_(at), lookups_(lookups) {}
+
+  /// See Flight::lookups.
+  std::uint32_t lookups() const { return lookups_; }
 
   void start(const nullmark::Rates& rates) requires several {
     rates_ = Rates(rates);
-    at_ = {Pack(0), Pack(rates_.begin_), Index(0)};
+    go_back();
   }
+
+  void go_back() { at_ = {Pack(0), Pack(rates_.begin_), Index(0)}; }
 
   [[gnu::always_inline]] Mask next(Streams& rng) { return next(rng, true); }
 
@@ -158,6 +163,7 @@ class LaneFlight {
 
   Rates& rates_;
   Place& at_;
+  std::uint32_t lookups_;
 };
 
 }  // namespace nullmark

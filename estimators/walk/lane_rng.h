@@ -34,6 +34,12 @@ class LaneRng {
     return fraction();
   }
 
+  /// Draws count for the walks that go on.
+  [[gnu::always_inline]] Pack uniform(Mask goes_on) {
+    draws_ += count(goes_on & alive_);
+    return fraction();
+  }
+
   /// Unit exponentials -log(1 - u): at most 36.7 (16.6 in float).
   [[gnu::always_inline]] Pack exponential() {
     draws_ += living_;

@@ -45,6 +45,9 @@ class Rng {
     return static_cast<Real>(next() >> 11) * 0x1p-53;
   }
 
+  /// Of a walk that goes on.
+  Real uniform(bool) { return uniform(); }
+
   /// Unit exponential -log(1 - u); 1 - u is exact, so u = 0 gives 0 and u = 1 - 2^-53 gives 36.7.
   Real exponential() {
     if (ready_ < 0) return negative_logarithm(1 - uniform());

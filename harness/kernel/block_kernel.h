@@ -151,7 +151,7 @@ class BlockKernel : public Kernel {
     if (profile) state.marked.assign(count, 0);
     for (std::size_t k = 0; k < count; ++k) {
       state.rng[k] = Rng(SampleAddress{key, context.index, first + k});
-      state.flight[k].start(ray.majorant);
+      state.flight[k].set_out(ray.majorant);
       estimator_.init(state.walk[k], ray, state.flight[k], state.rng[k]);
       state.active[k] = static_cast<std::uint32_t>(k);
     }
@@ -211,6 +211,7 @@ class BlockKernel : public Kernel {
         }
         if constexpr (!Traits::kIgnoresMajorant)
           audit_majorant(largest(extinction), ray.majorant.rate(state.flight[k].piece()), counters);
+        state.flight[k].set_lookups(step);
         estimator_.consume(state.walk[k], ray, state.flight[k], extinction, state.rng[k]);
         if constexpr (recorded) state.recording->walks[recorded_before + k].steps.back().draws = state.rng[k].draws();
         bool overrun = ++lookups[k] == state.most_lookups;

@@ -25,30 +25,38 @@ consteval std::size_t member_count() {
     return sizeof...(Members);
 }
 
-/// Visits the registers of an aggregate in their order.
+/// Visits the registers of an aggregate, and of those in it, in their order.
 template <class Aggregate, class Visit>
 [[gnu::always_inline]] inline void each_register(Aggregate& x, const Visit& visit) {
-  constexpr std::size_t n = member_count<Aggregate>();
-  static_assert(n >= 1 && n <= 4, "a walk in lanes has one to four members");
-  const auto one = [&](auto& member) __attribute__((always_inline)) {
-    if constexpr (requires { member.kChannels; })
-      for (std::size_t c = 0; c < member.kChannels; ++c) visit(member[c]);
-    else
-      visit(member);
-  };
-  const auto all = [&](auto&... members) __attribute__((always_inline)) { (one(members), ...); };
-  if constexpr (n == 1) {
-    auto& [a] = x;
-    all(a);
-  } else if constexpr (n == 2) {
-    auto& [a, b] = x;
-    all(a, b);
-  } else if constexpr (n == 3) {
-    auto& [a, b, c] = x;
-    all(a, b, c);
+  if constexpr (requires { x.vector(); }) {
+    visit(x);
+  } else if constexpr (requires { x.kChannels; }) {
+    for (std::size_t c = 0; c < x.kChannels; ++c) visit(x[c]);
   } else {
-    auto& [a, b, c, d] = x;
-    all(a, b, c, d);
+    static_assert(std::is_aggregate_v<Aggregate>,
+                  "a walk in lanes holds Value, Distance<Value>, Truth<Value> and structs of them");
+    constexpr std::size_t n = member_count<Aggregate>();
+    static_assert(n >= 1 && n <= 6, "a struct of a walk in lanes has one to six members");
+    const auto all = [&](auto&... members) __attribute__((always_inline)) { (each_register(members, visit), ...); };
+    if constexpr (n == 1) {
+      auto& [a] = x;
+      all(a);
+    } else if constexpr (n == 2) {
+      auto& [a, b] = x;
+      all(a, b);
+    } else if constexpr (n == 3) {
+      auto& [a, b, c] = x;
+      all(a, b, c);
+    } else if constexpr (n == 4) {
+      auto& [a, b, c, d] = x;
+      all(a, b, c, d);
+    } else if constexpr (n == 5) {
+      auto& [a, b, c, d, e] = x;
+      all(a, b, c, d, e);
+    } else {
+      auto& [a, b, c, d, e, f] = x;
+      all(a, b, c, d, e, f);
+    }
   }
 }
 
@@ -111,9 +119,10 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     alignas(HWY_MAX_BYTES) std::array<T, kRow * C> extinction{};
     alignas(HWY_MAX_BYTES) std::array<T, kRow> steps{};  ///< of walks that have ended, as the bits of an Index
     std::array<std::uint8_t, kBlock / N * Mask::kBytes> ended{};
-    /// Results of ended walks after compaction; whole registers are written at the end.
-    alignas(HWY_MAX_BYTES) std::array<std::array<T, kBlock + N>, C> left_result{};
-    alignas(HWY_MAX_BYTES) std::array<T, kBlock + N> left_sample{}, left_steps{};
+    /// Numbers of ended walks after compaction, and their results; whole registers are written at the end.
+    alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, sizeof(typename E::Walk) / sizeof(Pack)> left_walk{};
+    alignas(HWY_MAX_BYTES) std::array<T, kRow> left_sample{}, left_steps{};
+    alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, C> left_result{};
   };
 
  public:
@@ -220,7 +229,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       Walks walks;
       walks.stream = Streams::seeded({first.key, first.ray, first.sample + k});
       walks.sample = Index::counting_from(static_cast<typename Index::Number>(k));
-      LaneFlight<T, N> flight(rates, walks.place);
+      LaneFlight<T, N> flight(rates, walks.place, 0);
       Streams rng(walks.stream, there);
       flight.start(state.ray.majorant);
       kernel.estimator_.init(walks.walk, state.ray, flight, rng);
@@ -243,9 +252,9 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       Walks walks;
       walks.place.piece = Index(0);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
-        if (n != kPiece || several) load(lanes, n, k);
+        if (n != kPiece || several) load(lanes, state.numbers[n], k);
       });
-      LaneFlight<T, N, several> flight(rates, walks.place);
+      LaneFlight<T, N, several> flight(rates, walks.place, step);
       Streams rng(walks.stream, alive);
       const Value extinction = Value::load(&state.extinction[k * C]);
       if constexpr (!Traits::kIgnoresMajorant)
@@ -267,7 +276,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       if (step > 0)
         walks.each_of_walk([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
           auto before = lanes;
-          load(before, n, k);
+          load(before, state.numbers[n], k);
           lanes = select(ended, before, lanes);
         });
       bits(Index(static_cast<typename Index::Number>(step))).store(&state.steps[k], ends);
@@ -296,10 +305,8 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
           Pack(ranks(Pack::load(&from[k]).vector())).store(&to[at]);
         };
         const ClosedRanks<T, N> close_dead(dead), close_living(alive);
-        Walks walks;
-        walks.each_of_walk([&](auto& number, std::size_t n) { load(number, n, k); });
-        const Value answer = this->answer(walks);
-        for (std::size_t c = 0; c < C; ++c) Pack(close_dead(channel(answer, c).vector())).store(&state.left_result[c][left]);
+        for (std::size_t n = 0; n < state.left_walk.size(); ++n)
+          close(close_dead, state.numbers[kWalk + n], state.left_walk[n], left);
         close(close_dead, state.steps, state.left_steps, left);
         close(close_dead, state.numbers[kSample], state.left_sample, left);
         left += count(dead);
@@ -308,6 +315,13 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
         for (std::size_t axis = 0; axis < 3; ++axis)
           if (moves_along(axis)) close(close_living, state.points[axis], state.points[axis], kept);
         kept += count(alive);
+      }
+      for (std::size_t i = 0; i < left; i += N) {
+        Walks walks;
+        walks.each_of_walk([&](auto& number, std::size_t n)
+                               __attribute__((always_inline)) { load(number, state.left_walk[n - kWalk], i); });
+        const Value answer = this->answer(walks);
+        for (std::size_t c = 0; c < C; ++c) channel(answer, c).store(&state.left_result[c][i]);
       }
       for (std::size_t i = 0; i < left; ++i) {
         const auto sample = static_cast<std::size_t>(std::bit_cast<typename Index::Number>(state.left_sample[i]));
@@ -322,10 +336,10 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       return lanes;
     }
 
-    /// Reads a register of the walks from k on.
+    /// Reads a register of a row, from the k-th walk on.
     template <class Number>
-    [[gnu::always_inline]] void load(Number& lanes, std::size_t n, std::size_t k) const {
-      lanes = Number(hn::BitCast(hn::DFromV<decltype(raw(lanes))>(), Pack::load(&state.numbers[n][k]).vector()));
+    [[gnu::always_inline]] static void load(Number& lanes, const std::array<T, kRow>& row, std::size_t k) {
+      lanes = Number(hn::BitCast(hn::DFromV<decltype(raw(lanes))>(), Pack::load(&row[k]).vector()));
     }
 
     static auto raw(const auto& lanes) {

@@ -3,18 +3,27 @@
 #include <gtest/gtest.h>
 
 #include "estimators/delta.h"
+#include "estimators/jackknife.h"
 #include "estimators/majorant_guided_ratio.h"
+#include "estimators/marching_inversion.h"
 #include "estimators/mis_unidirectional.h"
 #include "estimators/next_flight_delta.h"
 #include "estimators/next_flight_ratio.h"
+#include "estimators/p_series_cmf.h"
+#include "estimators/p_series_cumulative.h"
+#include "estimators/p_series_next_flight.h"
+#include "estimators/p_series_ratio.h"
 #include "estimators/published_next_flight_ratio.h"
 #include "estimators/ratio.h"
 #include "estimators/ray_marching.h"
 #include "estimators/residual_delta.h"
 #include "estimators/residual_ratio.h"
+#include "estimators/telescoping.h"
+#include "estimators/telescoping_difference.h"
 #include "estimators/weighted_delta.h"
 #include "harness/kernel/estimator_template.h"
 #include "harness/kernel/lane_kernel_test.h"
+#include "harness/registry/components.h"
 
 namespace nullmark {
 namespace {
@@ -85,6 +94,59 @@ TEST(Lanes, RayMarchingIsTheSameAtEveryWidth) {
             estimator.offset = offset;
           },
           quantity);
+}
+
+TEST(Lanes, PowerSeriesAreTheSameAtEveryWidth) {
+  compare_widths<PowerSeriesRatio>(kAsItIs);
+  compare_widths<PowerSeriesNextFlight>(kAsItIs);
+  compare_widths<PowerSeriesCmf>(kAsItIs);
+  compare_widths<PowerSeriesCumulative>(kAsItIs);
+}
+TEST(Lanes, JackknifeMarchesAreTheSameAtEveryWidth) {
+  for (const int m : {2, 3, 4})
+    for (const char* jitter : {"stratified", "uniform"})
+      for (const char* mean : {"jackknife", "naive"})
+        compare_widths<Jackknife>([&](auto& estimator) {
+          estimator.m = m;
+          estimator.steps = 3;
+          estimator.jitter = jitter;
+          estimator.mean = mean;
+        });
+}
+TEST(Lanes, InvertedMarchesAreTheSameAtEveryWidth) {
+  for (const Quantity quantity : {Quantity::transmittance, Quantity::optical_depth})
+    compare_widths<MarchingInversion>(kAsItIs, quantity);
+}
+TEST(Lanes, TelescopingMarchesAreTheSameAtEveryWidth) {
+  compare_widths<Telescoping>(kAsItIs);
+  for (const char* marches : {"correlated", "independent"})
+    compare_widths<TelescopingDifference>([&](auto& estimator) {
+      estimator.level = 2;
+      estimator.marches = marches;
+    });
+}
+
+/// e^{-M} underflows and W overflows, in float even more: the powers of 2 that are set aside are each walk's own.
+TEST(Lanes, DeepSeriesAreTheSameAtEveryWidth) {
+  Case deep = cases()[0];
+  for (const Real bound : {20., 60., 200., 1000.}) {
+    deep.majorant = std::make_shared<GlobalMajorant>(*deep.medium, bound);
+    const auto expect = [&](const auto& series) {
+      const auto source = make_estimator({series, {}, {}, {}});
+      const Sampled plain = sampled(*source->kernel(1, Precision::float64, false), deep, 100);
+      expect_same(plain, sampled(*source->kernel(1), deep, 100), series);
+      const Sampled single = sampled(*source->kernel(1, Precision::float32), deep, 100);
+      Real mean = 0, in_double = 0;
+      for (std::size_t i = 0; i < 100; ++i) {
+        mean += single.values[i] / 100;
+        in_double += plain.values[i] / 100;
+        EXPECT_TRUE(std::isfinite(single.values[i])) << series << " " << bound;
+      }
+      EXPECT_NEAR(mean, in_double, 0.5 * in_double) << series << " " << bound;
+    };
+    expect("p_series_cmf");
+    expect("p_series_cumulative");
+  }
 }
 
 /// A ray that misses the medium has nothing to look up.

@@ -95,7 +95,11 @@ template <class E, class RayData>
   Flight flight;
   flight.start(ray.majorant);
   estimator.init(walk, ray, flight, rng);
-  while (goes_on() && estimator.propose(walk, ray, flight, rng)) estimator.consume(walk, ray, flight, look_up(walk, flight), rng);
+  for (std::uint32_t lookups = 1; goes_on() && estimator.propose(walk, ray, flight, rng); ++lookups) {
+    const auto extinction = look_up(walk, flight);
+    flight.set_lookups(lookups);
+    estimator.consume(walk, ray, flight, extinction, rng);
+  }
   return flight;
 }
 

@@ -95,8 +95,18 @@ class LaneColours {
   friend LaneColours exponential(const LaneColours& a) {
     return each(a, a, [](Pack x, Pack) { return exponential(x); });
   }
+  friend LaneColours one_minus_exponential(const LaneColours& a) {
+    return each(a, a, [](Pack x, Pack) { return one_minus_exponential(x); });
+  }
+  friend LaneColours cosine(const LaneColours& a) {
+    return each(a, a, [](Pack x, Pack) { return cosine(x); });
+  }
   friend LaneColours signed_root(const LaneColours& a) {
     return each(a, a, [](Pack x, Pack) { return signed_root(x); });
+  }
+  template <class Function>
+  friend LaneColours one_by_one(const LaneColours& a, const Function& f) {
+    return each(a, a, [&](Pack x, Pack) { return one_by_one(x, f); });
   }
   friend Pack largest(const LaneColours& a) {
     Pack most = a[0];

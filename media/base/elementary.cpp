@@ -33,6 +33,10 @@ Real negative_logarithm(Real x) { return only(negative_logarithm(One(x))); }
 
 Real exponential(Real x) { return only(exponential(One(x))); }
 
+Real cosine(Real x) { return only(cosine(One(x))); }
+
+Real one_minus_exponential(Real x) { return only(one_minus_exponential(One(x))); }
+
 void negative_logarithms(const Real* x, std::size_t n, Real* out) {
   map(x, n, out, [](auto lanes) { return negative_logarithm(lanes); });
 }

@@ -61,6 +61,13 @@ class Lanes {
   friend Lanes magnitude(Lanes a) { return hn::Abs(a.vector_); }
   friend Lanes signed_root(Lanes a) { return hn::CopySign(hn::Sqrt(hn::Abs(a.vector_)), a.vector_); }
   friend Lanes rounded_down(Lanes a) { return hn::Floor(a.vector_); }
+  /// 2^n, for whole n in [0, 127].
+  friend Lanes power_of_two(Lanes n) {
+    const hn::RebindToSigned<Tag> integers;
+    constexpr int kMantissa = std::is_same_v<T, float> ? 23 : 52;
+    constexpr T kBias = std::is_same_v<T, float> ? 127 : 1023;
+    return hn::BitCast(Tag(), hn::ShiftLeft<kMantissa>(hn::ConvertTo(integers, hn::Add(n.vector_, hn::Set(Tag(), kBias)))));
+  }
   /// At most 1 ulp off.  In float what is below the least normal number is 0: steps with denormal numbers take a CPU hundreds of
   /// cycles, and the tail of a Gaussian layer would have one in most registers.
   friend Lanes exponential(Lanes a) {
@@ -84,6 +91,13 @@ class Lanes {
   /// At most 3 ulp off, for magnitudes below 39000.
   friend Lanes cosine(Lanes a) { return hn::Cos(Tag(), a.vector_); }
   friend Lanes sine(Lanes a) { return hn::Sin(Tag(), a.vector_); }
+  template <class Function>
+  friend Lanes one_by_one(Lanes a, const Function& f) {
+    T x[N];
+    a.store(x);
+    for (std::size_t k = 0; k < N; ++k) x[k] = static_cast<T>(f(static_cast<Real>(x[k])));
+    return load(x);
+  }
   friend T least_normal(Lanes) { return std::numeric_limits<T>::min(); }
   friend LaneMask<T, N> vanished(Lanes a) { return a == Lanes(0); }
   /// Sum of all lanes, each half onto the other: the same order at every N that starts from the same numbers.

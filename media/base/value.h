@@ -101,6 +101,15 @@ Evaluated<T> exponential(const Colours<T>& x) {
   return result;
 }
 
+template <class T>
+Evaluated<T> cosine(const Colours<T>& x) {
+  return x.unaryExpr([](Real number) { return cosine(number); });
+}
+template <class T>
+Evaluated<T> one_minus_exponential(const Colours<T>& x) {
+  return x.unaryExpr([](Real number) { return one_minus_exponential(number); });
+}
+
 /// sgn(x) |x|^(1/2), and what undoes it.
 inline Real signed_root(Real x) { return std::copysign(std::sqrt(std::abs(x)), x); }
 template <class T>
@@ -135,6 +144,10 @@ Evaluated<A> select(const Colours<Condition>& yes, const Colours<A>& a, const Co
   return yes.select(a, b);
 }
 
+template <class A, class B>
+Evaluated<A> smaller(const Colours<A>& a, const Colours<B>& b) {
+  return a.min(b);
+}
 template <class T>
 Evaluated<T> smaller(const Colours<T>& x, Real most) {
   return x.min(most);
@@ -144,11 +157,25 @@ Evaluated<T> larger(const Colours<T>& x, Real least) {
   return x.max(least);
 }
 
+inline Real rounded_down(Real x) { return std::floor(x); }
+/// 2^n, for whole n in [0, 127].
+inline Real power_of_two(Real n) { return std::exp2(n); }
+
 inline bool none(bool x) { return !x; }
 
 template <class Value, std::integral Index>
 const Value& entry(const std::vector<Value>& table, Index i) {
   return table[static_cast<std::size_t>(i)];
+}
+
+/// f of every number, one after the other: for functions that have no form in lanes.
+template <class Function>
+Real one_by_one(Real x, const Function& f) {
+  return f(x);
+}
+template <class T, class Function>
+Evaluated<T> one_by_one(const Colours<T>& x, const Function& f) {
+  return x.unaryExpr([&](Real number) { return f(number); });
 }
 
 /// Whether every channel is 0.
