@@ -50,8 +50,9 @@ HistoryResult result_of(RunRecord run, const std::string& file) {
   result.date = start.get<std::string>();
   result.commit = commit_of(run);
   result.cpu = told(run, "cpu", "model");
-  result.build = counts_of(run, file).build.text();
-  result.incomplete = run.cells.size() < summarise(run).configured;
+  const Counts counts = counts_of(run, file);
+  result.build = counts.build.text();
+  result.partial = counts.partial || run.cells.size() < summarise(run).configured;
   result.run = std::move(run);
   return result;
 }
@@ -106,7 +107,7 @@ void refuse_other_blocks(const std::vector<TimedBlock>& blocks, const HistoryRes
     if (made_by(run) != made_by(expected.run) || run.name != expected.run.name)
       throw InputError(
           fmt::format("--blocks: holds runs of another program or configuration than {}; expected those of the last "
-                      "two results, old and new",
+                      "two results that are compared, old and new",
                       expected.file));
   };
   for (const TimedBlock& block : blocks)
@@ -118,6 +119,42 @@ void refuse_other_blocks(const std::vector<TimedBlock>& blocks, const HistoryRes
         machines.insert(told(*run, "cpu", "model"));
     }
   if (machines.size() > 1) throw InputError("--blocks: holds runs of several CPUs; expected runs that took turns on one");
+}
+
+bool is_whole(const HistoryResult& result) {
+  return !result.partial && std::none_of(result.run.cells.begin(), result.run.cells.end(),
+                                         [](const CellRecord& record) { return record.status == Status::not_run; });
+}
+
+/// Names the results that a step leaves out.
+std::string left_out_note(const std::vector<HistoryResult>& results, std::size_t first, std::size_t end) {
+  constexpr std::size_t kNamed = 3;
+  std::string names;
+  for (std::size_t i = first; i < std::min(end, first + kNamed); ++i) names += (i == first ? "" : ", ") + results[i].file;
+  const std::size_t count = end - first;
+  if (count > kNamed) names += fmt::format(" and {} more", count - kNamed);
+  return fmt::format("not compared with {}, which {} fewer cells to compare, but with {}", names, count == 1 ? "has" : "have",
+                     results[first - 1].file);
+}
+
+/// A part of the cells, such as those of a shard, must not hide that earlier results can be compared.
+HistoryStep step_to(const std::vector<HistoryResult>& results, std::size_t to, const std::vector<TimedBlock>& blocks) {
+  HistoryStep step;
+  for (std::size_t from = to; from-- > 0;) {
+    HistoryStep tried = compare_results(results[from], results[to], {});
+    tried.since = from;
+    const bool enough = !compares_nothing(tried) && is_whole(results[from]);
+    if (from + 1 == to || tried.compared > step.compared) step = std::move(tried);
+    if (enough) break;
+  }
+  const std::size_t since = step.since;
+  if (!blocks.empty()) {
+    refuse_other_blocks(blocks, results[since], results[to]);
+    step = compare_results(results[since], results[to], blocks);
+    step.since = since;
+  }
+  if (since + 1 < to) step.notes.push_back(left_out_note(results, since + 1, to));
+  return step;
 }
 
 }  // namespace
@@ -172,10 +209,8 @@ History history_of(std::vector<RunRecord> runs, const std::vector<std::string>& 
                    [](const HistoryResult& a, const HistoryResult& b) { return a.date < b.date; });
   shorten_dates(history.results);
   const std::size_t count = history.results.size();
-  if (!blocks.empty() && count > 1) refuse_other_blocks(blocks, history.results[count - 2], history.results[count - 1]);
   for (std::size_t i = 1; i < count; ++i)
-    history.steps.push_back(
-        compare_results(history.results[i - 1], history.results[i], i + 1 == count ? blocks : std::vector<TimedBlock>()));
+    history.steps.push_back(step_to(history.results, i, i + 1 == count ? blocks : std::vector<TimedBlock>()));
   return history;
 }
 
@@ -187,5 +222,7 @@ std::string changes_counted(const HistoryStep& step) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", names.size(), to_string(change));
   return text;
 }
+
+bool compares_nothing(const HistoryStep& step) { return step.compared == 0 && step.changed == 0; }
 
 }  // namespace nullmark

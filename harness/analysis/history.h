@@ -47,12 +47,13 @@ struct HistoryResult {
   std::string date;    ///< of the start: "2026-11-20", with the time where two results share a day
   std::string commit;  ///< seven digits, "changed" behind them if the source was not that of the commit; empty: unknown
   std::string cpu, build;
-  bool incomplete = false;  ///< holds fewer cells than its configuration
+  bool partial = false;  ///< may lack cells that the configuration has: not selected, of a missing shard, or never started
   RunRecord run;
 };
 
-/// From a result to the next.
+/// What changed in a result, since an earlier one.
 struct HistoryStep {
+  std::size_t since = 0;                ///< index of the earlier result
   std::size_t cells = 0, compared = 0;  ///< of either side; sampled on both
   std::size_t changed = 0;              ///< cells with a change
   /// Cells that are sampled on both sides, by the numbers of samples a ray before and after, where they differ.
@@ -66,7 +67,7 @@ struct HistoryStep {
 /// Results of one configuration in the order of their dates.
 struct History {
   std::vector<HistoryResult> results;
-  std::vector<HistoryStep> steps;     ///< one fewer
+  std::vector<HistoryStep> steps;     ///< one fewer: steps[i] leads to results[i + 1]
   std::vector<std::string> warnings;  ///< of copies that were left out
 };
 
@@ -75,13 +76,17 @@ struct History {
 inline constexpr Real kFalseErrorChanges = 1e-4;
 
 /// Judges lookups, draws, instructions and misses as the performance gate does.  The errors of samples are judged by the rank sum
-/// of their sixteen parts.  Times are judged by `blocks` alone, which compare the programs of the last two results; there are
-/// none where it is empty.  Throws InputError where results are of different configurations or do not tell their dates, and where
-/// `blocks` hold other programs.
+/// of their sixteen parts.  A result is compared with the one before it.  Where that holds a part of the cells, it is compared
+/// with the latest that has the most cells in common, back to the first that is no part.  Times are judged by `blocks` alone,
+/// which compare the programs of the last step; there are none where it is empty.  Throws InputError where results are of
+/// different configurations or do not tell their dates, and where `blocks` hold other programs.
 History history_of(std::vector<RunRecord> runs, const std::vector<std::string>& files,
                    const std::vector<TimedBlock>& blocks = {});
 
 /// How many cells changed in each way: "1 verdict, 2 slower".
 std::string changes_counted(const HistoryStep& step);
+
+/// Whether no cell could be compared, so that nothing is known of changes.
+bool compares_nothing(const HistoryStep& step);
 
 }  // namespace nullmark

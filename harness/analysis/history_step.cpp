@@ -106,7 +106,7 @@ class StepComparer {
       else if (before &&
                (is_sampled(*before) || is_sampled(after) || before->status == Status::error || after.status == Status::error))
         add_pair(*before, after);
-      else if (!before && !is_partial(before_, was_))
+      else if (!before && !before_.partial)
         changed(after.cell.name, Change::came, "", marked_word(after), "");
       else
         ++left_out;
@@ -114,7 +114,7 @@ class StepComparer {
     for (const CellRecord& before : before_.run.cells) {
       if (!earlier.contains(before.cell.name)) continue;
       ++step_.cells;
-      if (is_partial(after_, is_))
+      if (after_.partial)
         ++left_out;
       else
         changed(before.cell.name, Change::went, marked_word(before), "", "");
@@ -127,9 +127,6 @@ class StepComparer {
     if (left_out > 0)
       step_.notes.push_back(fmt::format("{} cell{} not selected in both, or not run", left_out, left_out == 1 ? "" : "s"));
   }
-
-  /// Whether cells may be absent that the configuration has: not selected, of a missing shard, or never started.
-  static bool is_partial(const HistoryResult& result, const Counts& counts) { return counts.partial || result.incomplete; }
 
   void add_pair(const CellRecord& before, const CellRecord& after) {
     const Kind was = kind_of(before), is = kind_of(after);

@@ -168,6 +168,50 @@ TEST(History, DoesNotMissCellsThatWereNotSelected) {
   EXPECT_EQ(gone.notes.at(0), "1 cell not selected in both, or not run");
 }
 
+/// The results of a shard, whose cells are all drawn in part.
+RunRecord shard(const char* start) {
+  return dated(start, [](RunRecord& run) {
+    run.provenance["shard"] = "\"1/2\"";
+    for (CellRecord& cell : run.cells) {
+      cell = unsampled(cell, Status::not_run, "parts of the cell are drawn");
+      cell.drawn_parts = {"part"};
+    }
+  });
+}
+
+TEST(History, SaysThatNothingWasComparedWithAShard) {
+  const History history = history_of({dated(kOld), shard(kNew)}, {"a", "b"});
+  const std::string text = history_text(history, 0);
+  EXPECT_EQ(text.find("nothing could be compared since 2026-11-20"), 0u) << text;
+  EXPECT_NE(text.find("2026-11-26  nothing was compared  "), std::string::npos) << text;
+  EXPECT_EQ(history_json(history)["steps"][0]["says"], "nothing was compared");
+}
+
+TEST(History, ComparesAcrossPartsOfTheCells) {
+  const auto failing = [](RunRecord& run) { run.cells[1].verdict = failed().verdict; };
+  const auto few = [](RunRecord& run) {
+    run.cells.erase(run.cells.begin() + 1, run.cells.end());
+    run.provenance["shard"] = "\"1/2\"";
+  };
+  const char* kMiddle = "2026-11-22T09:00:00Z";
+  for (const RunRecord& part : {shard(kMiddle), dated(kMiddle, few)}) {
+    const History history = history_of({dated(kOld), part, dated(kNew, failing)}, {"old", "part", "new"});
+    EXPECT_EQ(changes_line(history), "1 of 3 cells changed since 2026-11-20 (commit 0123abc): 1 verdict");
+    const std::string text = history_text(history, 0);
+    EXPECT_NE(text.find("\nnot compared with part, which has fewer cells to compare, but with old\n"), std::string::npos) << text;
+    EXPECT_NE(text.find("2026-11-26  1 cell: 1 verdict, since 2026-11-20  "), std::string::npos) << text;
+  }
+  // The one before is enough where it is no part, and where nothing earlier has more of the cells.
+  EXPECT_EQ(changes_line(history_of({dated(kOld), dated(kMiddle), dated(kNew, failing)}, {"a", "b", "c"})),
+            "1 of 3 cells changed since 2026-11-22 (commit 0123abc): 1 verdict");
+  const auto changed = [&](RunRecord& run) {
+    few(run);
+    run.cells[0].verdict = failed().verdict;
+  };
+  EXPECT_EQ(changes_line(history_of({dated(kOld), dated(kMiddle, few), dated(kNew, changed)}, {"a", "b", "c"})),
+            "1 of 1 cells changed since 2026-11-22 (commit 0123abc): 1 verdict");
+}
+
 TEST(History, DoesNotCallCellsGoneThatAreDrawnInPartOrWereNeverStarted) {
   const auto in_part = [](RunRecord& run) {
     run.cells[1] = unsampled(run.cells[1], Status::not_run, "parts of the cell are drawn");

@@ -49,8 +49,11 @@ Json history_json(const History& history) {
                                {"cpu", result.cpu},
                                {"build", result.build},
                                {"verdicts", verdicts_counted(result.run)}});
-  for (const HistoryStep& step : history.steps)
-    json["steps"].push_back({{"cells", step.cells},
+  for (std::size_t i = 0; i < history.steps.size(); ++i) {
+    const HistoryStep& step = history.steps[i];
+    json["steps"].push_back({{"since", step.since},
+                             {"says", change_shown(history, i + 1)},
+                             {"cells", step.cells},
                              {"compared", step.compared},
                              {"changed", step.changed},
                              {"counts", changes_counted(step)},
@@ -58,6 +61,7 @@ Json history_json(const History& history) {
                              {"undecided", changes_json(step.undecided)},
                              {"notes", step.notes},
                              {"time", step.time}});
+  }
   std::vector<CellsOf> cells;
   for (const HistoryResult& result : history.results) {
     CellsOf& of = cells.emplace_back();

@@ -80,14 +80,7 @@ std::vector<Line> results_table(const History& history) {
   if (machines) lines[0].insert(lines[0].end(), {"CPU", "build"});
   for (std::size_t i = 0; i < history.results.size(); ++i) {
     const HistoryResult& result = history.results[i];
-    std::string changed = "-";
-    if (i > 0) {
-      const HistoryStep& step = history.steps[i - 1];
-      changed = step.changed == 0
-                    ? "nothing"
-                    : fmt::format("{} cell{}: {}", step.changed, step.changed == 1 ? "" : "s", changes_counted(step));
-    }
-    lines.push_back({result.date, changed, verdicts_counted(result.run), result.commit, result.file});
+    lines.push_back({result.date, change_shown(history, i), verdicts_counted(result.run), result.commit, result.file});
     if (machines) lines.back().insert(lines.back().end(), {result.cpu, result.build});
   }
   return lines;
@@ -142,10 +135,20 @@ std::string verdicts_counted(const RunRecord& run) {
   return text;
 }
 
+std::string change_shown(const History& history, std::size_t result) {
+  if (result == 0) return "-";
+  const HistoryStep& step = history.steps[result - 1];
+  if (compares_nothing(step)) return "nothing was compared";
+  const std::string since = step.since + 1 == result ? "" : fmt::format(", since {}", history.results[step.since].date);
+  return (step.changed == 0 ? "nothing"
+                            : fmt::format("{} cell{}: {}", step.changed, step.changed == 1 ? "" : "s", changes_counted(step))) +
+         since;
+}
+
 std::string changes_line(const History& history) {
   const HistoryStep& step = history.steps.back();
-  const std::string since = of_commit(history.results[history.results.size() - 2]);
-  if (step.changed == 0 && step.compared == 0) return fmt::format("nothing could be compared since {}", since);
+  const std::string since = of_commit(history.results[step.since]);
+  if (compares_nothing(step)) return fmt::format("nothing could be compared since {}", since);
   std::string text;
   if (step.changed > 0)
     text = fmt::format("{} of {} cells changed since {}: {}", step.changed, step.cells, since, changes_counted(step));

@@ -73,9 +73,7 @@ function changesTable(changes) {
 
 function resultsTable({ results, steps }) {
   const rows = results.map((result, i) => {
-    const step = steps[i - 1];
-    const changed = !step ? unknown : step.changed === 0 ? "nothing" : `${countOf(step.changed, "cell")}: ${step.counts}`;
-    return [result.date, changed, result.verdicts, result.commit, result.cpu, result.file];
+    return [result.date, i === 0 ? unknown : steps[i - 1].says, result.verdicts, result.commit, result.cpu, result.file];
   });
   return plainTable(["result", "changed since the one before", "verdicts", "commit", "CPU", "file"], rows.reverse());
 }

@@ -143,6 +143,9 @@ class ContentsTest(PageTest):
         if history is None:
             self.skipTest("the results are no series")
         self.assertEqual(self.find("#history .meaning").text, history["says"])
+        shown = self.js("""return [...[...document.querySelectorAll('#history h3')].at(-1).nextElementSibling.querySelectorAll('tbody tr')]
+            .map((row) => row.cells[1].textContent)""")
+        self.assertEqual(shown[-2::-1] + shown[-1:], [step["says"] for step in history["steps"]] + ["–"])
         last = history["steps"][-1]
         rows = self.js("return [...document.querySelectorAll('#history .history:first-of-type')].map((one) => one.tBodies[0].rows.length)")
         if last["changes"]:
