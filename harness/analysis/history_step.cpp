@@ -124,6 +124,7 @@ class StepComparer {
           fmt::format("{} cell{} drawn in part, so not compared: merge the results of all shards, or draw the rest with "
                       "`nullmark run CONFIG --resume`",
                       in_part, in_part == 1 ? "" : "s"));
+    tell_seeds();
     if (left_out > 0)
       step_.notes.push_back(fmt::format("{} cell{} not selected in both, or not run", left_out, left_out == 1 ? "" : "s"));
   }
@@ -139,6 +140,23 @@ class StepComparer {
     ++step_.compared;
     if (before.cell.samples_per_ray != after.cell.samples_per_ray)
       ++step_.other_samples[{before.cell.samples_per_ray, after.cell.samples_per_ray}];
+  }
+
+  /// "other seed (1 → 7) in 54 cells": whoever reads of differences must know of it.
+  void tell_seeds() {
+    constexpr std::size_t kNamed = 2;
+    std::map<std::pair<std::uint64_t, std::uint64_t>, std::size_t> seeds;
+    std::size_t cells = 0;
+    for (const auto& [before, after] : pairs_)
+      if (before->cell.seed != after->cell.seed) ++seeds[{before->cell.seed, after->cell.seed}], ++cells;
+    if (cells == 0) return;
+    std::string named;
+    std::size_t left = kNamed;
+    for (auto at = seeds.begin(); at != seeds.end() && left > 0; ++at, --left)
+      named += fmt::format("{}{} → {}", named.empty() ? "" : ", ", at->first.first, at->first.second);
+    if (seeds.size() > kNamed) named += fmt::format(", and {} more", seeds.size() - kNamed);
+    step_.notes.push_back(
+        fmt::format("other seed ({}) in {} cell{}: their samples differ by chance", named, cells, cells == 1 ? "" : "s"));
   }
 
   /// Whether the same build drew the same samples, so that no difference is chance.

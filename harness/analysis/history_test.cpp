@@ -247,6 +247,18 @@ TEST(History, SaysWhyErrorsAreNotCompared) {
   EXPECT_EQ(note([](CellRecord& record) { record.channel[0].reference.reset(); }), "errors not compared: no reference in 1 cell");
 }
 
+TEST(History, NamesTheSeeds) {
+  const auto seeded = [](std::uint64_t seed) {
+    return [seed](RunRecord& run) {
+      draw_with_another_seed(run);
+      for (CellRecord& record : run.cells) record.cell.seed = seed;
+    };
+  };
+  const History history = history_of({dated(kOld), dated(kNew, seeded(7))}, {"a", "b"});
+  EXPECT_EQ(history.steps.back().notes.at(0), "other seed (1 → 7) in 3 cells: their samples differ by chance");
+  EXPECT_EQ(last({dated(kOld, seeded(7)), dated(kNew, seeded(7))}).notes.size(), 0u);
+}
+
 TEST(History, NamesTheNumbersOfSamples) {
   const History history = history_of({dated(kOld), dated(kNew,
                                                          [](RunRecord& run) {
