@@ -65,6 +65,21 @@ TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
   EXPECT_GT(loose.verdict->tests.at(0).reference_error, 1e-4);
 }
 
+TEST(Run, ATrackerThatAnswersOnGreyMediaAloneSaysSo) {
+  const Plan cells = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",
+      "samples_per_ray":4,"quantity":"free_path","matrix":{"estimator":["delta","ratio"],
+      "medium":{"type":"linear","spectrum":[1,2,3,4]}}}]})",
+                                 "test.json");
+  const std::vector<CellRecord> records = run(cells, 1, {});
+  EXPECT_EQ(records[0].status, Status::skipped);
+  EXPECT_EQ(records[0].reason.find("delta does not answer free_path on 4 channels; take a grey medium, or a tracker that does: "),
+            0u)
+      << records[0].reason;
+  EXPECT_NE(records[0].reason.find("spectral"), std::string::npos) << records[0].reason;
+  // Another medium does not help.
+  EXPECT_EQ(records[1].reason, "ratio does not answer free_path");
+}
+
 /// What is left of samples that are not all finite has no say.
 TEST(Run, ACellThatIsNotFiniteKeepsReferencesAndTheoryAlone) {
   const Plan cells = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e","rays":"single",

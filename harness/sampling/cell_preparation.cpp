@@ -156,12 +156,34 @@ void CellPreparer::add_light(PreparedCell& prepared, const EstimatorSource& sour
                                                              : SampleRange::non_negative;
 }
 
+namespace {
+
+bool answers_on_grey_media(const Component& tracker, Quantity quantity) {
+  const std::vector<Quantity>& answered = Registry<EstimatorEntry>::instance().find(tracker.type)->quantities;
+  return std::find(answered.begin(), answered.end(), quantity) != answered.end();
+}
+
+/// ", or a tracker that does: spectral"; empty if there is none.
+std::string trackers_for(Quantity quantity, int channels) {
+  constexpr std::size_t kNamed = 3;
+  std::vector<std::string> names;
+  for (const EstimatorEntry& entry : Registry<EstimatorEntry>::instance().entries())
+    if (!entry.foreign && !entry.planted && names.size() < kNamed)
+      if (const auto kernel = entry.make()->kernel(channels); kernel && kernel->answers(quantity)) names.push_back(entry.name);
+  return names.empty() ? "" : fmt::format(", or a tracker that does: {}", fmt::join(names, ", "));
+}
+
+}  // namespace
+
 std::string CellPreparer::why_not(const Cell& cell, const Component& tracker, const Scene& scene, const Kernel* made) {
   const int channels = scene.medium->medium->channels();
   if (!made)
     return channels > 1 ? fmt::format("{} channels have no form in float; expected precision \"double\"", channels)
                         : fmt::format("{} has no form in float; expected precision \"double\"", tracker.type);
   const Kernel& kernel = *made;
+  if (!kernel.answers(cell.quantity) && channels > 1 && answers_on_grey_media(tracker, cell.quantity))
+    return fmt::format("{} does not answer {} on {} channels; take a grey medium{}", tracker.type, to_string(cell.quantity),
+                       channels, trackers_for(cell.quantity, channels));
   if (!kernel.answers(cell.quantity))
     return fmt::format("{} does not answer {}{}", tracker.type, to_string(cell.quantity),
                        cell.precision == Precision::float32 ? " in float" : "");
