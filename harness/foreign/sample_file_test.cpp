@@ -116,6 +116,35 @@ TEST_F(SampleFiles, SpectraAndSinglesAreJudged) {
   expect_refused("p s.npy --scene 7", "has no scene \"7\"; it has 0, 1");
 }
 
+/// A number between two words; nothing where they are not there.
+std::optional<Real> number_after(const std::string& text, const std::string& before) {
+  const std::size_t at = text.find(before);
+  return at == std::string::npos ? std::optional<Real>() : std::stod(text.substr(at + before.size()));
+}
+
+TEST_F(SampleFiles, WhatAVerdictTakesIsTheTotal) {
+  pose(R"("linear")");
+  const Plan plan = scene();
+  const PreparedCell cell = drawn_samples::prepared(plan);
+  constexpr std::size_t kFew = 400;
+  write_npy("few.npy", {kFew, 64}, drawn_samples::drawn(cell, kFew));
+  ASSERT_EQ(run("judge p few.npy --range unit"), 77) << read("out") << read("err");
+  const std::string out = read("out");
+  const SampleSplit split = split_samples(kFew);
+  EXPECT_NE(
+      out.find(fmt::format("not decidable at {} samples a ray, {} of them the pilot's; a PASS at epsilon ", kFew, split.pilot)),
+      std::string::npos)
+      << out;
+  // The widest margin is that of a group of rays.
+  const auto total = number_after(out, " of the mean of a group of rays needs ");
+  EXPECT_NE(out.find(" in all (relative variance "), std::string::npos) << out;
+  ASSERT_TRUE(total) << out;
+  // As many are enough.
+  const auto enough = static_cast<std::size_t>(1.1 * *total);
+  write_npy("enough.npy", {enough, 64}, drawn_samples::drawn(cell, enough));
+  EXPECT_EQ(run("judge p enough.npy --range unit"), 0) << read("out") << read("err");
+}
+
 TEST_F(SampleFiles, AnswersAreWhatSamplesEstimate) {
   pose(R"(["linear",{"type":"gaussian_bump"}])", R"([{"type":"chords","count":50},{"type":"orthographic","width":3,"height":2}])",
        "optical_depth");

@@ -6,6 +6,7 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
+#include "harness/kernel/given_samples.h"
 #include "harness/sampling/margins.h"
 
 namespace nullmark {
@@ -42,6 +43,13 @@ constexpr Real kPlannedPower = 1.645, kUnsure = 1e-3;
 std::uint64_t per_ray(Real samples, std::size_t rays) {
   const Real each = std::ceil(samples / static_cast<Real>(rays));
   return each < 9e15 ? static_cast<std::uint64_t>(each) : std::uint64_t{1} << 53;
+}
+
+/// The fewest samples of which so many are judged, and the others the pilot's.
+std::uint64_t with_a_pilot(std::uint64_t judged) {
+  std::uint64_t samples = judged;
+  while (split_samples(samples).judged < judged) samples += judged - split_samples(samples).judged;
+  return samples;
 }
 
 std::uint64_t largest_power_of_two_divisor(std::uint64_t n) { return n & (~n + 1); }
@@ -234,6 +242,16 @@ class TestPlanner {
     test.sure = needed(boost::math::quantile(complement(boost::math::normal(), kUnsure / static_cast<Real>(levels_.tests))));
   }
 
+  /// "2000 samples a ray, 272 of them the pilot's": whoever hands samples in counts the pilot's as well.
+  std::string counted(std::uint64_t judged) const {
+    if (!pilot_ || pilot_->taken == 0) return fmt::format("{} samples a ray", judged);
+    return fmt::format("{} samples a ray, {} of them the pilot's", judged + pilot_->taken, pilot_->taken);
+  }
+  std::string needed_in_all(std::uint64_t judged) const {
+    const auto digits = [](std::uint64_t samples) { return fmt::format("{:.2g}", static_cast<double>(samples)); };
+    return pilot_ && pilot_->taken > 0 ? digits(with_a_pilot(judged)) + " in all" : digits(judged);
+  }
+
   /// What the test of a mean asks of the cell.
   void demand(const MeanTest& test, const Pool& pool) {
     if (test.reference_error > 0.25 * test.epsilon)
@@ -245,12 +263,12 @@ class TestPlanner {
     sure_ = test.sure;
     // Relative to a mean that has underflowed nothing can be said.
     const Real mean = std::max(std::abs(pool.size), least_of(cell_.precision));
-    needs_ = fmt::format("not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} (relative variance {:.2g})",
-                         plan_.affordable, test.epsilon / mean, static_cast<double>(test.planned), test.variance / (mean * mean));
-    tight_ = fmt::format(
-        "perhaps not decidable at {} samples a ray; a PASS at epsilon {:.2g} needs {:.2g} with a chance of .95, and {:.2g} to be "
-        "sure",
-        plan_.allowance, test.epsilon / mean, static_cast<double>(test.planned), static_cast<double>(test.sure));
+    const std::string epsilon = fmt::format("a PASS at epsilon {:.2g}{}", test.epsilon / mean,
+                                            test.group == MeanTest::kAllRays ? "" : " of the mean of a group of rays");
+    needs_ = fmt::format("not decidable at {}; {} needs {} (relative variance {:.2g})", counted(plan_.affordable), epsilon,
+                         needed_in_all(test.planned), test.variance / (mean * mean));
+    tight_ = fmt::format("perhaps not decidable at {}; {} needs {} with a chance of .95, and {} to be sure",
+                         counted(plan_.allowance), epsilon, needed_in_all(test.planned), needed_in_all(test.sure));
   }
 
   /// Whether the samples allowed decide the mean, and what is missing where they do not.

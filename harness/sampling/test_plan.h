@@ -74,6 +74,7 @@ struct Pilot {
   std::vector<Real> lookups_variance;      ///< per ray
   std::uint64_t samples = 0, lookups = 0;  ///< of all rays
   Real variance_of_variance = 0;           ///< largest over outputs of sum d^4/(sum d^2)^2 - 1/n
+  std::uint64_t taken = 0;                 ///< samples a ray that it took of those that were handed in; 0 where it drew its own
 };
 
 /// Levels that tests are planned for.

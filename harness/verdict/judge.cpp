@@ -40,6 +40,7 @@ void run_pilot(const PreparedCell& prepared, const std::function<bool()>& stop, 
     const Real mean = static_cast<Real>(sampled->lookups[ray]) / n;
     pilot.lookups_variance.push_back(std::max<Real>(0, (sampled->lookups_squared[ray] - n * mean * mean) / (n - 1)));
   }
+  pilot.taken = prepared.kernel->pilot_samples().value_or(0);
   pilot.samples = sampled->counters.samples;
   pilot.lookups = sampled->counters.lookups;
   // Below this share of the squared distance to the target a variance is rounding; one that has underflowed tells nothing.
