@@ -84,41 +84,48 @@ bool is_unbiased_estimator(const RankedCell& ranked) {
 /// tracker.
 bool are_rivals(const RankedCell& a, const RankedCell& b) { return a.tracker != b.tracker; }
 
-/// How many other trackers are proven faster in all of their results that have a time.
-std::size_t proven_faster(const std::vector<RankedCell>& cells, const RankedCell& than) {
-  std::map<std::string, bool> faster;
+/// How many other trackers are better than a cell in all of their results that count.
+template <class Counts, class IsBetter>
+std::size_t better_in_all_results(const std::vector<RankedCell>& cells, const RankedCell& than, const Counts& counts,
+                                  const IsBetter& is_better) {
+  std::map<std::string, bool> better;
   for (const RankedCell& other : cells) {
-    if (!has_time(other) || !are_rivals(other, than)) continue;
-    const bool proven = quotient(*than.seconds[0], *other.seconds[0]).low > 1;
-    const auto [at, first] = faster.try_emplace(other.tracker, proven);
-    if (!first) at->second = at->second && proven;
+    if (!counts(other) || !are_rivals(other, than)) continue;
+    bool& all = better.try_emplace(other.tracker, true).first->second;
+    all = all && is_better(other);
   }
-  return static_cast<std::size_t>(std::count_if(faster.begin(), faster.end(), [](const auto& one) { return one.second; }));
+  return static_cast<std::size_t>(std::count_if(better.begin(), better.end(), [](const auto& one) { return one.second; }));
 }
 
 void rank(std::vector<RankedCell>& cells) {
   const auto key = [](const RankedCell& ranked) { return has_time(ranked) ? ranked.seconds[0]->value : kInfinity; };
   std::stable_sort(cells.begin(), cells.end(), [&](const RankedCell& a, const RankedCell& b) { return key(a) < key(b); });
   for (RankedCell& ranked : cells)
-    if (has_time(ranked)) ranked.rank = 1 + proven_faster(cells, ranked);
+    if (has_time(ranked))
+      ranked.rank = 1 + better_in_all_results(cells, ranked, has_time, [&](const RankedCell& other) {
+                      return quotient(*ranked.seconds[0], *other.seconds[0]).low > 1;
+                    });
   const auto place = [](const RankedCell& ranked) { return ranked.rank.value_or(std::numeric_limits<std::size_t>::max()); };
   std::stable_sort(cells.begin(), cells.end(), [&](const RankedCell& a, const RankedCell& b) { return place(a) < place(b); });
-  for (RankedCell& ranked : cells)
-    ranked.tied = ranked.rank && std::any_of(cells.begin(), cells.end(), [&](const RankedCell& other) {
-                    return are_rivals(other, ranked) && other.rank == ranked.rank;
-                  });
+  const auto any_other = [&](const auto& fits) { return std::any_of(cells.begin(), cells.end(), fits); };
+  for (RankedCell& ranked : cells) {
+    if (!ranked.rank) continue;
+    ranked.tied = any_other([&](const RankedCell& other) { return are_rivals(other, ranked) && other.rank == ranked.rank; });
+    ranked.split = any_other(
+        [&](const RankedCell& other) { return !are_rivals(other, ranked) && other.seconds[0] && other.rank != ranked.rank; });
+  }
 }
 
 void mark_pareto(std::vector<RankedCell>& cells) {
+  const auto is_known = [](const RankedCell& ranked) { return ranked.cost && ranked.cost->ns_per_sample; };
   for (RankedCell& one : cells) {
-    if (!one.cost || !one.cost->ns_per_sample) continue;
+    if (!is_known(one)) continue;
     const auto beats = [&](const RankedCell& other) {
-      if (!are_rivals(one, other) || !other.cost || !other.cost->ns_per_sample) return false;
       const Real variance = one.cost->variance.value - other.cost->variance.value;
       const Real time = one.cost->ns_per_sample->value - other.cost->ns_per_sample->value;
       return variance >= 0 && time >= 0 && (variance > 0 || time > 0);
     };
-    one.pareto = std::none_of(cells.begin(), cells.end(), beats);
+    one.pareto = better_in_all_results(cells, one, is_known, beats) == 0;
   }
 }
 

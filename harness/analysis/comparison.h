@@ -27,7 +27,8 @@ struct RankedCell {
   /// ratio of times above 1.  Equal ranks are ties.  Absent if no time is known or the target is out of reach.
   std::optional<std::size_t> rank;
   bool tied = false;                    ///< a cell of another tracker has the same rank
-  bool pareto = false;                  ///< no cell of another tracker has less variance and less time per sample
+  bool split = false;                   ///< another result of the same tracker has another rank, or never reaches the target
+  bool pareto = false;                  ///< no other tracker has less variance and less time per sample in all of its results
   std::optional<Interval> relative;     ///< seconds to the first target divided by those of the baseline, if of another tracker
   std::optional<BreakEven> break_even;  ///< for cells with a floor, against Comparison::best_unbiased
 };

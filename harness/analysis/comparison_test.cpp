@@ -188,8 +188,16 @@ TEST(Comparison, ResultsOfOneTrackerAreNoRivals) {
   EXPECT_FALSE(by.at("ratio/samples:1000")->tied);
   EXPECT_EQ(*by.at("slow")->rank, 3u);  // ratio counts once
   EXPECT_TRUE(by.at("ratio/samples:1000")->pareto);
+  EXPECT_TRUE(by.at("delta")->pareto);  // as for ranks, all results of ratio would have to beat it
+  EXPECT_FALSE(by.at("slow")->pareto);
   EXPECT_TRUE(by.at("ratio/samples:100")->relative);
   EXPECT_FALSE(by.at("ratio/samples:1000")->relative);
+  const std::string split = compare_text(runs, "", false);
+  EXPECT_EQ(split.find("Fastest to 1 % error, alone or tied, of 1 scene: ratio/samples:100 in 1 scene, delta in 1 scene; "), 0u)
+      << split;
+  EXPECT_NE(split.find("\nranks of ratio: 1 and 2; a tracker is faster than another only if all of its results are\n"),
+            std::string::npos)
+      << split;
   runs[1].cells[0].time->repetition_ns = runs[0].cells[0].time->repetition_ns;
   const std::string text = compare_text(runs, "", false);
   EXPECT_EQ(

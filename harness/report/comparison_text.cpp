@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "harness/analysis/comparison.h"
@@ -153,6 +154,24 @@ std::string remark_lines(const Comparison& comparison) {
   return text;
 }
 
+/// Ranks of one tracker that differ: what is said of one of its results does not hold of all.
+std::string split_lines(const Comparison& comparison) {
+  std::map<std::string, std::vector<std::string>> ranks;
+  // Cells are in the order of their ranks.
+  for (const RankedCell& ranked : comparison.cells) {
+    if (!ranked.seconds[0]) continue;
+    const std::string rank = ranked.rank ? fmt::to_string(*ranked.rank) : "never";
+    std::vector<std::string>& of = ranks[ranked.tracker];
+    if (of.empty() || of.back() != rank) of.push_back(rank);
+  }
+  std::string text;
+  for (const auto& [tracker, of] : ranks)
+    if (of.size() > 1)
+      text += fmt::format("ranks of {}: {}; a tracker is faster than another only if all of its results are\n", tracker,
+                          fmt::join(of, " and "));
+  return text;
+}
+
 /// Of trackers in processes of their own: what is theirs of their time.
 std::string seam_lines(const Comparison& comparison) {
   std::string text;
@@ -171,14 +190,15 @@ std::string seam_lines(const Comparison& comparison) {
 }
 
 /// In how many scenes each tracker is among the fastest, the most frequent first: "ratio in 2 scenes, delta in 1 scene".  Several
-/// results of a tracker count once.
+/// results of a tracker count once; those that not all have this rank are named one by one.
 std::string fastest_counted(const std::vector<Comparison>& all, bool unbiased) {
   constexpr std::size_t kNamed = 2;
   std::vector<std::pair<std::string, std::size_t>> wins;
   for (const Comparison& comparison : all) {
     std::set<std::string> counted;
     for (const std::size_t i : fastest(comparison, unbiased)) {
-      const std::string& tracker = comparison.cells[i].tracker;
+      const RankedCell& ranked = comparison.cells[i];
+      const std::string& tracker = ranked.split ? ranked.label : ranked.tracker;
       if (!counted.insert(tracker).second) continue;
       const auto at = std::find_if(wins.begin(), wins.end(), [&](const auto& win) { return win.first == tracker; });
       at == wins.end() ? void(wins.emplace_back(tracker, 1)) : void(++at->second);
@@ -223,7 +243,8 @@ std::string compare_text(const std::vector<RunRecord>& runs, const std::string& 
   std::vector<std::string> left_out;
   for (const Comparison& comparison : all) {
     text += fmt::format("{}\n{}", comparison.name, shaped(ranking(comparison), 3, 2, shape, left_out));
-    text += amortised_line(comparison) + unproven_line(comparison) + seam_lines(comparison) + remark_lines(comparison);
+    text += amortised_line(comparison) + unproven_line(comparison) + split_lines(comparison) + seam_lines(comparison) +
+            remark_lines(comparison);
     if (paired && !comparison.pairings.empty()) text += fitted(pairs(comparison), 1, shape.width, left_out);
     if (paired) text += not_paired(comparison);
     text += baseline_line(comparison) + "\n\n";
@@ -255,8 +276,8 @@ std::string compare_markdown(const std::vector<RunRecord>& runs, const std::stri
     text += fmt::format("**{}**\n\n{}\n", markdown_cell(comparison.name), markdown_table(ranking(comparison)));
     // A line that begins with a star would be a list.
     const std::string unproven = unproven_line(comparison);
-    for (const std::string& line :
-         {amortised_line(comparison), unproven.empty() ? "" : "\\" + unproven, seam_lines(comparison), remark_lines(comparison)})
+    for (const std::string& line : {amortised_line(comparison), unproven.empty() ? "" : "\\" + unproven, split_lines(comparison),
+                                    seam_lines(comparison), remark_lines(comparison)})
       if (!line.empty()) text += markdown_cell(line) + "\n";
     if (paired && !comparison.pairings.empty()) text += markdown_table(pairs(comparison)) + "\n";
     if (paired && !comparison.unpaired.empty()) text += markdown_cell(not_paired(comparison)) + "\n";

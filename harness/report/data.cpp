@@ -44,6 +44,7 @@ Json scene_json(const Comparison& comparison, const Places& places) {
                        {"label", ranked.label},
                        {"rank", place(ranked.rank)},
                        {"tied", ranked.tied},
+                       {"split", ranked.split},
                        {"relative", interval(ranked.relative)}});
     if (!ranked.break_even) continue;
     const bool at = ranked.break_even->kind == BreakEven::Kind::at;

@@ -66,6 +66,12 @@ function unprovenNote(scene) {
   return anythingTimed && scene.unproven ? element("p", { className: "says" }, `* ${scene.unproven}.`) : "";
 }
 
+/** Ranks of one tracker that differ: what is said of one of its results does not hold of all. */
+function splitNote(entries) {
+  const some = new Set(entries.filter(({ split }) => split).map(({ cell }) => report.cells[cell].estimator));
+  return some.size > 0 ? element("p", { className: "says" }, `Results of ${listed([...some])} have different ranks. A tracker is faster than another only if all of its results are.`) : "";
+}
+
 function unpairedText(scene) {
   const reasons = report.unpaired.filter((one) => one.scene === scene.index && passes(report.cells[one.cell]));
   return reasons.length === 0 ? "" : `Not paired: ${reasons.map((one) => `${report.cells[one.cell].label} ${one.reason}`).join("; ")}.`;
@@ -89,7 +95,7 @@ function showRanking(panel, scene) {
   const entries = scene.ranking.filter((entry) => passes(report.cells[entry.cell]));
   const { titles, rows } = rankingRows(scene, entries);
   const table = element("table", { className: "ranking" }, headRow(titles), element("tbody", {}, ...rows));
-  panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), amortisedNote(entries), unprovenNote(scene), pairedTable(scene) ?? ""));
+  panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), amortisedNote(entries), unprovenNote(scene), splitNote(entries), pairedTable(scene) ?? ""));
 }
 
 function buildRanking(body) {

@@ -37,10 +37,11 @@ function winnerRow(scene) {
   return [scene.short, ...namesAndSeconds(winnersOf(scene)), ...namesAndSeconds(unbiasedWinnersOf(scene))];
 }
 
+/** Results of a tracker count once; those that not all have this rank are named one by one. */
 function tally(scenes, winners) {
   const wins = new Map();
   for (const scene of scenes)
-    for (const tracker of new Set(winners(scene).map(({ cell }) => report.cells[cell].estimator))) wins.set(tracker, (wins.get(tracker) ?? 0) + 1);
+    for (const name of new Set(winners(scene).map(({ cell, label, split }) => (split ? label : report.cells[cell].estimator)))) wins.set(name, (wins.get(name) ?? 0) + 1);
   return listed([...wins].sort((a, b) => b[1] - a[1]).map(([label, count]) => `${label} in ${countOf(count, "scene")}`), 2, "tracker");
 }
 

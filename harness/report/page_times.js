@@ -64,9 +64,10 @@ function againstRatio(scene, cell) {
 
 /** Who is the fastest that claims to be unbiased, what that costs, and what is proven of it. */
 function answerOf(scene) {
-  const said = ({ cell: place }) => {
+  const said = ({ cell: place, split }) => {
     const cell = report.cells[place];
-    return `${cell.label} (${formatSeconds(secondsTo(cell, 0).value)}${againstRatio(scene, cell)}; ${cell.marked_word})`;
+    const others = split ? `; not all results of ${cell.estimator} have this rank` : "";
+    return `${cell.label} (${formatSeconds(secondsTo(cell, 0).value)}${againstRatio(scene, cell)}; ${cell.marked_word}${others})`;
   };
   const each = entriesByTracker(unbiasedWinnersOf(scene)).map((own) => own.map(said).join(", measured again as "));
   return each.length === 0 ? "" : `Fastest that claims to be unbiased: ${each.join(", tied with ")}.`;

@@ -186,13 +186,15 @@ class ContentsTest(PageTest):
         if len(FILES) < 2 or not timed():
             self.skipTest("one result, or untimed ones")
         said = self.js("""return report.scenes.map((scene) => {
-            const ranking = scene.ranking.map((entry) => ({ ...entry, rank: 1, tied: true }));
+            const ranking = scene.ranking.map((entry) => ({ ...entry, rank: 1, tied: true, split: false }));
             const all = { ...scene, ranking };
             return { answer: answerOf(all), times: namesAndSeconds(ranking)[1], trackers: new Set(ranking.map(({ cell }) => report.cells[cell].estimator)).size,
                      unbiased: new Set(ranking.map(({ cell }) => report.cells[cell]).filter((cell) => cell.unbiased).map((cell) => cell.estimator)).size,
-                     count: ranking.length, tally: tally([all], winnersOf) };
+                     count: ranking.length, tally: tally([all], winnersOf),
+                     split: tally([{ ...scene, ranking: ranking.map((entry) => ({ ...entry, split: true })) }], winnersOf) };
         })""")
         for one in said:
+            self.assertTrue(one["count"] == one["trackers"] or one["split"] != one["tally"])
             self.assertGreater(one["count"], one["trackers"])
             self.assertEqual(one["answer"].count(", tied with "), one["unbiased"] - 1)
             self.assertEqual(one["times"].count(" = "), one["trackers"] - 1)
