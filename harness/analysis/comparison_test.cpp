@@ -198,6 +198,8 @@ TEST(Comparison, ResultsOfOneTrackerAreNoRivals) {
   EXPECT_NE(split.find("\nranks of ratio: 1 and 2; a tracker is faster than another only if all of its results are\n"),
             std::string::npos)
       << split;
+  EXPECT_NE(split.find("\n- under / baseline: another result of the baseline's tracker, which is no rival\n"), std::string::npos)
+      << split;
   runs[1].cells[0].time->repetition_ns = runs[0].cells[0].time->repetition_ns;
   const std::string text = compare_text(runs, "", false);
   EXPECT_EQ(

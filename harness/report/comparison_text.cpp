@@ -172,6 +172,14 @@ std::string split_lines(const Comparison& comparison) {
   return text;
 }
 
+/// Why cells that have a time are not compared with the baseline.
+std::string same_tracker_line(const Comparison& comparison) {
+  if (!comparison.baseline || !comparison.cells[*comparison.baseline].rank) return "";
+  const bool some = std::any_of(comparison.cells.begin(), comparison.cells.end(),
+                                [](const RankedCell& ranked) { return ranked.rank && !ranked.relative; });
+  return some ? "- under / baseline: another result of the baseline's tracker, which is no rival\n" : "";
+}
+
 /// Of trackers in processes of their own: what is theirs of their time.
 std::string seam_lines(const Comparison& comparison) {
   std::string text;
@@ -243,8 +251,8 @@ std::string compare_text(const std::vector<RunRecord>& runs, const std::string& 
   std::vector<std::string> left_out;
   for (const Comparison& comparison : all) {
     text += fmt::format("{}\n{}", comparison.name, shaped(ranking(comparison), 3, 2, shape, left_out));
-    text += amortised_line(comparison) + unproven_line(comparison) + split_lines(comparison) + seam_lines(comparison) +
-            remark_lines(comparison);
+    text += amortised_line(comparison) + unproven_line(comparison) + split_lines(comparison) + same_tracker_line(comparison) +
+            seam_lines(comparison) + remark_lines(comparison);
     if (paired && !comparison.pairings.empty()) text += fitted(pairs(comparison), 1, shape.width, left_out);
     if (paired) text += not_paired(comparison);
     text += baseline_line(comparison) + "\n\n";
@@ -274,10 +282,11 @@ std::string compare_markdown(const std::vector<RunRecord>& runs, const std::stri
   std::string text = "### nullmark compare\n\n";
   for (const Comparison& comparison : comparisons(runs, baseline)) {
     text += fmt::format("**{}**\n\n{}\n", markdown_cell(comparison.name), markdown_table(ranking(comparison)));
-    // A line that begins with a star would be a list.
+    // A line that begins with a star or a dash would be a list.
     const std::string unproven = unproven_line(comparison);
+    const std::string same = same_tracker_line(comparison);
     for (const std::string& line : {amortised_line(comparison), unproven.empty() ? "" : "\\" + unproven, split_lines(comparison),
-                                    seam_lines(comparison), remark_lines(comparison)})
+                                    same.empty() ? "" : "\\" + same, seam_lines(comparison), remark_lines(comparison)})
       if (!line.empty()) text += markdown_cell(line) + "\n";
     if (paired && !comparison.pairings.empty()) text += markdown_table(pairs(comparison)) + "\n";
     if (paired && !comparison.unpaired.empty()) text += markdown_cell(not_paired(comparison)) + "\n";

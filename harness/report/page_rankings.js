@@ -72,6 +72,12 @@ function splitNote(entries) {
   return some.size > 0 ? element("p", { className: "says" }, `Results of ${listed([...some])} have different ranks. A tracker is faster than another only if all of its results are.`) : "";
 }
 
+function sameTrackerNote(scene, entries) {
+  const base = scene.ranking.find(({ cell }) => cell === scene.baseline);
+  const some = base && base.rank !== null && entries.some(({ rank, relative }) => rank !== null && relative === null);
+  return some ? element("p", { className: "says" }, `${unknown} under cost relative to baseline: another result of the baseline's tracker, which is no rival.`) : "";
+}
+
 function unpairedText(scene) {
   const reasons = report.unpaired.filter((one) => one.scene === scene.index && passes(report.cells[one.cell]));
   return reasons.length === 0 ? "" : `Not paired: ${reasons.map((one) => `${report.cells[one.cell].label} ${one.reason}`).join("; ")}.`;
@@ -95,7 +101,7 @@ function showRanking(panel, scene) {
   const entries = scene.ranking.filter((entry) => passes(report.cells[entry.cell]));
   const { titles, rows } = rankingRows(scene, entries);
   const table = element("table", { className: "ranking" }, headRow(titles), element("tbody", {}, ...rows));
-  panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), amortisedNote(entries), unprovenNote(scene), splitNote(entries), pairedTable(scene) ?? ""));
+  panel.append(element("div", {}, element("h4", {}, scene.short), inScroller(table), amortisedNote(entries), unprovenNote(scene), splitNote(entries), sameTrackerNote(scene, entries), pairedTable(scene) ?? ""));
 }
 
 function buildRanking(body) {
