@@ -35,6 +35,10 @@ ExitCode replay_command(const ReplayCommand& command) {
     fmt::print("{}\n", replay_json(replay).dump(2));
   else
     tell("{}", replay_text(replay));
+  // Streams are addressed, so any sample can be drawn; but it is none of those that were judged.
+  if (choice.sample && replay.sample >= replay.held)
+    notice("nullmark: warning: --sample: found {}; the results hold {} of each ray, and not this one\n", replay.sample,
+           replay.held == 0 ? "no samples" : fmt::format("samples 0 to {}", replay.held - 1));
   return ExitCode::ok;
 }
 

@@ -115,11 +115,17 @@ std::size_t place_of(const Plan& plan, const std::string& file, const Cell& cell
       fmt::format("{}: the configuration in it does not hold \"{}\" as it was sampled; run it again", file, cell.name));
 }
 
-/// As many as its verdict took; of a cell that was not sampled, as many as are planned.
+/// As many as its verdict took; none of a cell that was not sampled.
+std::uint64_t drawn_per_ray(const CellRecord& record) {
+  if (record.rays == 0 || record.samples == 0) return 0;
+  return std::max(record.samples / record.rays, record.verdict ? record.verdict->samples_per_ray : 0);
+}
+
+/// Of a cell that was not sampled, as many as are planned.
 std::uint64_t samples_per_ray(const PreparedCell& cell, const CellRecord& record) {
-  if (record.rays == 0 || record.samples == 0) return cell.samples_per_ray;
-  const std::uint64_t samples = std::max(record.samples / record.rays, record.verdict ? record.verdict->samples_per_ray : 0);
-  const std::uint64_t planned = cell.samples_per_ray, allowed = cell.cell->verdict.max_samples_per_ray;
+  const std::uint64_t samples = drawn_per_ray(record), planned = cell.samples_per_ray;
+  if (samples == 0) return planned;
+  const std::uint64_t allowed = cell.cell->verdict.max_samples_per_ray;
   const std::uint64_t most = allowed == 0 ? kMostSampleFactor * planned : std::max(planned, allowed);
   // How many share lookups equally is not in the configuration.
   if (samples > most && !cell.cell->equal_lookups)
@@ -218,6 +224,7 @@ Replay replay_sample(const RunRecord& run, const std::string& file, const std::s
   replay.cell = name;
   replay.ray = *choice.ray;
   replay.sample = *choice.sample;
+  replay.held = drawn_per_ray(record);
   replay.world = cell.scene->rays->world[replay.ray];
   replay.quantity = cell.cell->quantity;
   replay.precision = cell.cell->precision;

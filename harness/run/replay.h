@@ -20,7 +20,8 @@ struct SampleChoice {
 struct Replay {
   std::string cell;
   std::uint64_t ray = 0, sample = 0;
-  Ray world;  ///< cut to the medium
+  std::uint64_t held = 0;  ///< samples of each ray that the results drew, pilots aside
+  Ray world;               ///< cut to the medium
   Quantity quantity = Quantity::transmittance;
   Precision precision = Precision::float64;
   int channels = 1;

@@ -204,6 +204,12 @@ TEST_F(ReplayCli, ShowsASampleOfAFile) {
   ASSERT_EQ(ProgramTest::run("replay c.results.json " + cell + " --json"), 0) << read("err");
   const Json sample = Json::parse(read("out"));
   EXPECT_EQ(sample["lookups"], sample["steps"].size());
+  ASSERT_EQ(ProgramTest::run("replay c.results.json " + cell + " --ray 0 --sample 49"), 0);
+  EXPECT_EQ(read("err"), "");
+  ASSERT_EQ(ProgramTest::run("replay c.results.json " + cell + " --ray 0 --sample 50"), 0);
+  EXPECT_EQ(read("err"),
+            "nullmark: warning: --sample: found 50; the results hold samples 0 to 49 of each ray, and not this one\n");
+  EXPECT_NE(read("out").find(", ray 0, sample 50\n"), std::string::npos) << read("out");
   for (const char* wrong : {"--sample 3", "--ray -1 --sample 0", "--ray 0 --sample 1e3", "--ray x", "--sampel 2"}) {
     EXPECT_EQ(ProgramTest::run("replay c.results.json " + cell + " " + wrong), static_cast<int>(ExitCode::input_error)) << wrong;
     const std::string error = read("err");
