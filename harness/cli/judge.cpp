@@ -4,6 +4,7 @@
 #include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <string_view>
 
 #include "harness/analysis/check.h"
 #include "harness/cli/commands.h"
@@ -33,6 +34,21 @@ std::string estimator_json(const JudgeCommand& command) {
   std::filesystem::path samples(command.samples);
   if (!samples.has_filename()) samples = samples.parent_path();
   return Json{{"type", kSamplesType}, {"file", samples.filename().string()}, {"range", command.range}}.dump();
+}
+
+/// Throws InputError where there are no samples, and tells where they may be.
+void expect_samples(const JudgeCommand& command) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::status(command.samples, error).type() != fs::file_type::not_found) return;
+  const std::string missing = command.samples + ": no such file; ";
+  constexpr std::string_view kPrefix = "file:";
+  if (command.samples.starts_with(kPrefix)) throw InputError(fmt::format("{}leave out \"{}\"", missing, kPrefix));
+  const fs::path name = fs::path(command.samples).filename();
+  for (const fs::path& elsewhere : {fs::path(command.problem) / name, name})
+    if (!name.empty() && fs::exists(elsewhere, error))
+      throw InputError(fmt::format("{}{} is there", missing, elsewhere.string()));
+  throw InputError(missing + "expected an .npy file, or a folder of .exr images");
 }
 
 /// What more samples, or more knowledge of them, would do for a verdict that is open.
@@ -120,6 +136,7 @@ ExitCode judge_command(const JudgeCommand& command) {
   expect_new(command.output, command.force, kResultsBeginning);
   expect_threads(0);
   const ProblemScene scene = ProblemScene::read(command.problem, command.scene);
+  expect_samples(command);
   catch_signals();
   std::error_code error;
   const bool images = std::filesystem::is_directory(command.samples, error);

@@ -213,7 +213,7 @@ TEST_F(SampleFiles, FilesThatLieAreRefused) {
   write("no.npy", "PK\x03\x04 is how archives begin");
   expect_refused("p no.npy", "is no .npy file");
   expect_refused("p absent.npy", "absent.npy: no such file");
-  expect_refused("absent short.npy", "problem.json: no such file");
+  expect_refused("absent short.npy", "absent: no such folder");
   expect_refused("p rays.npy --range any", "unknown range \"any\"");
   write("p/problem.json", R"({"nullmark":"config/2"})");
   expect_refused("p rays.npy", "expected \"nullmark\": \"problem/1\"");
@@ -222,6 +222,20 @@ TEST_F(SampleFiles, FilesThatLieAreRefused) {
   expect_refused("p rays.npy", "found quantity \"free_path\"");
   write("p/problem.json", R"({"nullmark":"problem/1","config":{"nullmark":"config/2","experiments":[]}})");
   EXPECT_EQ(run("judge p rays.npy"), 2) << read("err");
+}
+
+TEST_F(SampleFiles, MissingFilesHaveRemedies) {
+  pose(R"("linear")");
+  write_npy("p/s.npy", {16, 64}, std::vector<Real>(16 * 64, 0.5));
+  write_npy("t.npy", {16, 64}, std::vector<Real>(16 * 64, 0.5));
+  expect_refused("p s.npy", "s.npy: no such file; p/s.npy is there");
+  expect_refused("p x/t.npy", "x/t.npy: no such file; t.npy is there");
+  expect_refused("p file:t.npy", "file:t.npy: no such file; leave out \"file:\"");
+  expect_refused("p none.npy", "none.npy: no such file; expected an .npy file, or a folder of .exr images");
+  expect_refused("none t.npy", "none: no such folder; `nullmark problem CONFIG -o none` writes it");
+  std::filesystem::create_directory(folder_ / "empty");
+  expect_refused("empty t.npy", "empty/problem.json: no such file; expected a folder that `nullmark problem` wrote");
+  expect_refused("t.npy p", "t.npy: is no folder; expected one that `nullmark problem` wrote");
 }
 
 TEST_F(SampleFiles, ProblemsThatCannotBeWrittenAreRefused) {

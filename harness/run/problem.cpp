@@ -313,6 +313,13 @@ std::vector<std::string> write_problem(const Plan& plan, const ProblemOptions& o
 
 ProblemScene ProblemScene::read(const std::string& folder, const std::string& id) {
   const std::string file = (fs::path(folder) / kFile).string();
+  std::error_code error;
+  if (const auto type = fs::status(folder, error).type(); type == fs::file_type::not_found)
+    throw InputError(fmt::format("{}: no such folder; `nullmark problem CONFIG -o {}` writes it", folder, folder));
+  else if (type != fs::file_type::directory)
+    throw InputError(folder + ": is no folder; expected one that `nullmark problem` wrote");
+  if (fs::status(file, error).type() == fs::file_type::not_found)
+    throw InputError(file + ": no such file; expected a folder that `nullmark problem` wrote");
   const Json problem = parse_json(read_file(file), file);
   const JsonNode top(problem, file);
   top.expect_object();
