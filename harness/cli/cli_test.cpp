@@ -166,6 +166,8 @@ TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
   ASSERT_EQ(run("run c.json -o r.json"), 0) << read("err");
   std::filesystem::create_directory(folder_ / "folder");
   const std::string results_text = read("r.json");
+  std::filesystem::create_directory(folder_ / "results");
+  for (const char* name : {"results/b.json", "results/a.json", "results/0.txt"}) write(name, results_text);
   write("cut.json", results_text.substr(0, results_text.size() / 2));
   write("empty.json", "");
   write("page.html", "<!doctype html>");
@@ -176,7 +178,8 @@ TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
       {"replay nowhere.json cell", "nowhere.json: no such file; `nullmark run"},
       {"report nowhere.json -o r.html", "nowhere.json: no such file; `nullmark run"},
       {"run nowhere.json", "nowhere.json: no such file"},
-      {"check folder", "folder: is a folder"},
+      {"check folder", "folder: is a folder; expected a results file"},
+      {"check results", "results: is a folder; expected a results file, such as results/a.json"},
       {"check c.json", "c.json: is a configuration; `nullmark run` it first"},
       {"run r.json", "r.json: is a results file; nullmark check, compare and report read it"},
       {"check other.json", "is not a results file of nullmark"},

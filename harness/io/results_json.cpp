@@ -78,8 +78,24 @@ std::string statistics_text(const RunRecord& run) {
   return text;
 }
 
+namespace {
+
+/// ", such as FOLDER/a.json": the first of the folder's files that may be results.
+std::string example_in(const std::string& folder) {
+  std::error_code error;
+  std::string first;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+    if (const std::string path = entry.path().string(); path.ends_with(".json") || path.ends_with(".json.gz"))
+      if (first.empty() || path < first) first = path;
+  return first.empty() ? "" : ", such as " + first;
+}
+
+}  // namespace
+
 RunRecord read_results_file(const std::string& file) {
   std::error_code error;
+  if (std::filesystem::is_directory(file, error))
+    throw InputError(fmt::format("{}: is a folder; expected a results file{}", file, example_in(file)));
   if (std::filesystem::status(file, error).type() == std::filesystem::file_type::not_found)
     throw InputError(fmt::format("{}: no such file; `nullmark run CONFIG -o {}` writes it", file, file));
   return read_results(read_file(file), file);
