@@ -69,19 +69,7 @@ void Portion::append(const Portion& next) {
   lookups_squared.insert(lookups_squared.end(), next.lookups_squared.begin() + from, next.lookups_squared.end());
   end_ray = next.end_ray;
   append_to(chunk_sums, next.chunk_sums);
-  for (std::size_t o = 0; o < outputs; ++o) {
-    groups[o] += next.groups[o];
-    blocks[o] += next.blocks[o];
-  }
-  counters += next.counters;
-  nonfinite += next.nonfinite;
-  out_of_range += next.out_of_range;
-  largest = std::max(largest, next.largest);
-  for (const auto& [test, more] : next.evidence) evidence[test] += more;
-  for (const auto& [test, more] : next.variances) variances[test] += more;
-  judging_seconds += next.judging_seconds;
-  statistics_seconds += next.statistics_seconds;
-  working_seconds += next.working_seconds;
+  add_what_rays_share(next, *this);
 }
 
 }  // namespace nullmark

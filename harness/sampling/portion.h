@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <utility>
@@ -44,6 +45,24 @@ struct Portion {
   /// Adds the chunks that follow.
   void append(const Portion& next);
 };
+
+/// Adds what a portion holds once for all of its rays.
+template <class Sums>
+void add_what_rays_share(const Portion& more, Sums& sums) {
+  for (std::size_t o = 0; o < more.groups.size(); ++o) {
+    sums.groups[o] += more.groups[o];
+    sums.blocks[o] += more.blocks[o];
+  }
+  sums.counters += more.counters;
+  sums.nonfinite += more.nonfinite;
+  sums.out_of_range += more.out_of_range;
+  sums.largest = std::max(sums.largest, more.largest);
+  for (const auto& [test, evidence] : more.evidence) sums.evidence[test] += evidence;
+  for (const auto& [test, evidence] : more.variances) sums.variances[test] += evidence;
+  sums.judging_seconds += more.judging_seconds;
+  sums.statistics_seconds += more.statistics_seconds;
+  sums.working_seconds += more.working_seconds;
+}
 
 /// The chunks of a span, and the portions that are made of them.  Both depend on the span and the number of rays alone.
 class SpanCut {

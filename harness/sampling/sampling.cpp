@@ -25,19 +25,7 @@ void add_portion(const Portion& part, std::size_t outputs, Sampled& result) {
     result.null_collisions[ray] += part.null_collisions[local];
     result.lookups_squared[ray] += part.lookups_squared[local];
   }
-  for (std::size_t o = 0; o < outputs; ++o) {
-    result.groups[o] += part.groups[o];
-    result.blocks[o] += part.blocks[o];
-  }
-  result.counters += part.counters;
-  result.nonfinite += part.nonfinite;
-  result.out_of_range += part.out_of_range;
-  result.largest = std::max(result.largest, part.largest);
-  result.statistics_seconds += part.statistics_seconds;
-  result.judging_seconds += part.judging_seconds;
-  result.working_seconds += part.working_seconds;
-  for (const auto& [test, evidence] : part.evidence) result.evidence[test] += evidence;
-  for (const auto& [test, evidence] : part.variances) result.variances[test] += evidence;
+  add_what_rays_share(part, result);
 }
 
 /// Groups of samples that are larger than a chunk, within one ray.
