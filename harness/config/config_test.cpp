@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <set>
 
+#include "harness/config/axes.h"
+#include "harness/io/file_io.h"
 #include "harness/io/json_input.h"
 #include "harness/io/spec_json.h"
 #include "harness/registry/components.h"
@@ -35,6 +37,15 @@ std::string error_of(const std::string& text) {
 }
 
 using Names = std::vector<std::string>;
+
+TEST(Config, EveryKeyOfAnExperimentIsInTheGuide) {
+  const std::string guide = read_file(NULLMARK_SOURCE_DIR "/harness/config/config.md");
+  const std::size_t begin = guide.find("Its keys are "), end = guide.find("**Names and ids.**");
+  ASSERT_TRUE(begin < end && end < guide.size());
+  const std::string text = guide.substr(begin, end - begin), of_matrix = text.substr(0, text.find("Each can instead"));
+  for (const std::string& name : axis_names()) EXPECT_NE(of_matrix.find("`" + name + "`"), std::string::npos) << name;
+  for (const SharedKey& key : shared_keys()) EXPECT_NE(text.find("\n| `" + key.name + "` | "), std::string::npos) << key.name;
+}
 
 TEST(Config, CrossesAxesAndSweptParametersFirstKeySlowest) {
   const Plan plan = plan_of(
