@@ -22,8 +22,9 @@ struct DeltaTracking {
   std::string walks = "shared";
 
   void parameters(ParameterVisitor& visit) {
-    visit.choice("walks", walks, {"shared", "separate"},
-                 "on chromatic media: one walk shared by the channels, or one walk per channel at its own majorant");
+    visit.choice(
+        "walks", walks, {"shared", "separate"},
+        "on chromatic media: one walk shared by the channels, or one walk per channel at its own majorant, without lanes");
   }
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
