@@ -25,11 +25,8 @@ Distance<Value> uniform_above_zero(auto& rng) {
 template <class GoesOn>
 [[gnu::always_inline]] inline void land_anywhere(const auto& ray, auto& flight, auto& rng, const GoesOn& goes_on) {
   const auto depth = rng.uniform(goes_on) * ray.majorant.total_depth();
-  flight.go_back();
-  const auto inside = flight.advance_to(depth);
-  if (none(!inside)) return;
-  flight.go_back();  // denormal depths round up
-  flight.advance_to(select(inside, depth, decltype(depth)(0)));
+  const auto inside = flight.land(depth);
+  if (!none(!inside)) flight.land(select(inside, depth, decltype(depth)(0)));  // denormal depths round up
 }
 
 /// e^{-M} (W_0 + W_1 + ...), W_0 = 1.  W may pass e^M, and e^{-M} is 0 from M = 746 on, so W is kept as a number near 1 times a

@@ -27,15 +27,10 @@ class Flight {
   /// Begins anew, on rates of the estimator's own.
   void start(const Rates& rates) {
     rates_ = &rates;
-    collisions_ = 0;
-    go_back();
-  }
-
-  /// Back to the ray's begin, on the same rates.
-  void go_back() {
     piece_ = 0;
+    collisions_ = 0;
     depth_ = 0;
-    position_ = rates_->begin();
+    position_ = rates.begin();
   }
 
   /// Moves to the next tentative collision; false when it lies beyond the ray's end, or where the walk is not `alive`.
@@ -56,6 +51,12 @@ class Flight {
     while (!(depth < rates_->known(piece_).depth_after)) ++piece_;
     position_ = rates_->position(rates_->known(piece_), depth);
     return true;
+  }
+
+  /// Moves to the point of the given depth, wherever the flight is, as if it set out anew.
+  bool land(Real depth) {
+    piece_ = rates_->reaches(depth) ? rates_->piece_of(depth) : 0;
+    return advance_to(depth);
   }
 
   /// Puts the walk at a distance chosen by the estimator itself (marches).

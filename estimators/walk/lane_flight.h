@@ -1,5 +1,8 @@
 #pragma once
 
+#include <bit>
+#include <type_traits>
+
 #include "estimators/walk/flight.h"
 #include "estimators/walk/lane_rng.h"
 
@@ -63,6 +66,7 @@ class LaneFlight {
   using Streams = LaneRng<T, N>;
   using Rates = LaneRates<T, N>;
   using Place = LanePlace<T, N>;
+  using Number = typename Index::Number;
 
   LaneFlight(Rates& rates, Place& at, std::uint32_t lookups) : rates_(rates), at_(at), lookups_(lookups) {}
 
@@ -71,10 +75,8 @@ class LaneFlight {
 
   void start(const nullmark::Rates& rates) requires several {
     rates_ = Rates(rates);
-    go_back();
+    at_ = {Pack(0), Pack(rates_.begin_), Index(0)};
   }
-
-  void go_back() { at_ = {Pack(0), Pack(rates_.begin_), Index(0)}; }
 
   [[gnu::always_inline]] Mask next(Streams& rng) { return next(rng, true); }
 
@@ -105,6 +107,20 @@ class LaneFlight {
     }
     at_.position = select(inside, position(rates_, at_), Pack(rates_.end_));
     return inside;
+  }
+
+  /// Moves to points of the given depths, wherever the flights are.
+  [[gnu::always_inline]] Mask land(Pack depth) {
+    at_.piece = Index(0);
+    if (several && rates_.last_ > 0) {
+      // The last piece whose predecessor is not that deep.
+      for (auto step = std::bit_floor(static_cast<std::make_unsigned_t<Number>>(rates_.last_)); step > 0; step /= 2) {
+        const Index ahead = at_.piece + Index(static_cast<Number>(step)), known = smaller(ahead, Index(rates_.last_));
+        const Mask behind = !(depth < rates_.template of<several, &RatePiece<T>::depth_before>(known)) & !(known < ahead);
+        at_.piece = select(behind, ahead, at_.piece);
+      }
+    }
+    return advance_to(depth);
   }
 
   void jump(Pack position) { at_.position = position; }

@@ -202,6 +202,7 @@ class LaneIndex {
   Vector vector() const { return vector_; }
 
   friend LaneIndex operator+(LaneIndex a, LaneIndex b) { return hn::Add(a.vector_, b.vector_); }
+  friend LaneIndex smaller(LaneIndex a, LaneIndex b) { return hn::Min(a.vector_, b.vector_); }
   friend LaneMask<T, N> operator<(LaneIndex a, LaneIndex b) {
     return hn::RebindMask(hn::FixedTag<T, N>(), hn::Lt(a.vector_, b.vector_));
   }

@@ -119,6 +119,14 @@ class Rates {
     return i < known_.size();
   }
 
+  /// The first piece that is deeper than a depth that the ray reaches.
+  std::size_t piece_of(Real depth) const {
+    const auto& all = known_.all();
+    const auto found =
+        std::partition_point(all.begin(), all.end(), [depth](const auto& at) { return !(depth < at.depth_after); });
+    return static_cast<std::size_t>(found - all.begin());
+  }
+
   Real end(std::size_t i) const { return piece(i).end; }
   Real rate(std::size_t i) const { return piece(i).rate; }
   /// The same, for walks that find their rays' pieces as they go: without a call where piece i is known.
