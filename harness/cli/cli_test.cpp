@@ -180,8 +180,6 @@ TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
       {"run nowhere.json", "nowhere.json: no such file"},
       {"check folder", "folder: is a folder; expected a results file"},
       {"check results", "results: is a folder; expected a results file, such as results/a.json"},
-      {"merge r.json -o m.json",
-       "r.json: holds all cells of its configuration; expected results of shards (`nullmark run CONFIG "},
       {"check c.json", "c.json: is a configuration; `nullmark run` it first"},
       {"run r.json", "r.json: is a results file; nullmark check, compare and report read it"},
       {"check other.json", "is not a results file of nullmark"},

@@ -6,7 +6,6 @@
 #include <set>
 #include <string_view>
 
-#include "harness/analysis/check.h"
 #include "harness/cli/commands.h"
 #include "harness/io/json_input.h"
 #include "harness/io/notice.h"
@@ -25,15 +24,6 @@ void tell_open(const std::vector<std::string>& cells, const std::string& output)
          cells.size(), output);
   for (std::size_t i = 0; i < std::min(cells.size(), kMost); ++i) notice("  {}\n", cells[i]);
   if (cells.size() > kMost) notice("  and {} more\n", cells.size() - kMost);
-}
-
-/// Whether results hold a part of the cells, as those of a shard, of a selection or of a run that was stopped do.
-bool is_part(const RunRecord& run) {
-  for (const char* selection : {"shard", "filter", "covering"})
-    if (run.provenance.contains(selection)) return true;
-  return run.cells.size() < configured_cells(
-                                run, [](const Json&) { return true; }) ||
-         std::any_of(run.cells.begin(), run.cells.end(), [](const CellRecord& one) { return one.status == Status::not_run; });
 }
 
 /// Which shards are missing, where all parts are shards of as many.
@@ -62,11 +52,6 @@ ExitCode merge_command(const MergeCommand& command) {
   expect_new(command.output, command.force, kResultsBeginning);
   std::vector<RunRecord> parts;
   for (const std::string& file : command.parts) parts.push_back(read_results_file(file));
-  if (std::none_of(parts.begin(), parts.end(), is_part))
-    throw InputError(
-        fmt::format("{}: holds all cells of its configuration{}; expected results of shards (`nullmark run CONFIG "
-                    "--shard K/N`)",
-                    command.parts[0], parts.size() > 1 ? ", and so do the others" : ""));
   tell_missing(parts);
   RunRecord merged = merge_results(parts, command.parts, builds_of(command.builds));
   std::vector<RunRecord>().swap(parts);
