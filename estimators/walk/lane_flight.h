@@ -116,7 +116,8 @@ class LaneFlight {
       // The last piece whose predecessor is not that deep.
       for (auto step = std::bit_floor(static_cast<std::make_unsigned_t<Number>>(rates_.last_)); step > 0; step /= 2) {
         const Index ahead = at_.piece + Index(static_cast<Number>(step)), known = smaller(ahead, Index(rates_.last_));
-        const Mask behind = !(depth < rates_.template of<several, &RatePiece<T>::depth_before>(known)) & !(known < ahead);
+        const Mask behind =
+            (ahead < Index(rates_.last_ + 1)) & !(depth < rates_.template of<several, &RatePiece<T>::depth_before>(known));
         at_.piece = select(behind, ahead, at_.piece);
       }
     }

@@ -205,7 +205,8 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
           break;
         }
         const auto& [x, y, z] = state.points;
-        medium.extinction(BasicPoints<T>{x.data(), y.data(), z.data(), lanes}, state.extinction.data());
+        // Lanes beyond the last walk take no lookup: one may cost more than a step.
+        medium.extinction(BasicPoints<T>{x.data(), y.data(), z.data(), tally.walks}, state.extinction.data());
         if (rates.has_several())
           go_on<true>(lanes, step, tally);
         else
