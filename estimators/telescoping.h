@@ -40,7 +40,7 @@ struct Telescoping {
   void prepare(RayData& ray) const { ray.log_rest = std::log1p(-r); }
 
   struct Walk {
-    Value base, even, odd;          ///< sums of e^{-v_i}, and of mu at even and at odd i
+    Value base, even, odd;          ///< means so far: of e^{-v_i}, and of mu at even and at odd i
     Distance<Value> offset, level;  ///< n
     Distance<Value> count;          ///< 2^{n+1}
   };
@@ -58,15 +58,17 @@ struct Telescoping {
   }
 
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
-    walk.base += exponential(Value(-extinction * ray.length()));
-    (at.lookups() % 2 == 1 ? walk.even : walk.odd) += extinction;
+    // Running means: sums lose digits with every lookup, and the longest marches take more than 10^4.
+    const std::uint32_t done = at.lookups();
+    const auto take_in = [](Value& mean, const Value& x, std::uint32_t n) { mean += (x - mean) * (1 / static_cast<Real>(n)); };
+    take_in(walk.base, exponential(Value(-extinction * ray.length())), done);
+    take_in(done % 2 == 1 ? walk.even : walk.odd, extinction, (done + 1) / 2);
   }
 
   Value result(const Walk& walk, const auto& ray) const {
     if (!(ray.length() > 0)) return ray.value(1);
-    const Distance<Value> of_half = ray.length() / (walk.count * .5);
     const Distance<Value> chance = r * exponential(walk.level * ray.log_rest);
-    return walk.base / walk.count + march_difference(Value(walk.even * of_half), Value(walk.odd * of_half)) / chance;
+    return walk.base + march_difference(Value(walk.even * ray.length()), Value(walk.odd * ray.length())) / chance;
   }
 
   Theory theory(const RayData& ray, const RayProfile& profile, int c, Quantity) const {

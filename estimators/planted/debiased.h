@@ -44,10 +44,7 @@ struct PlantedUnweightedLevel : Telescoping<Value> {
   using RayData = typename Base::RayData;
   using Walk = typename Base::Walk;
 
-  Value result(const Walk& walk, const RayData& ray) const {
-    const Value base = walk.base / walk.count;
-    return base + (Base::result(walk, ray) - base) * this->r;
-  }
+  Value result(const Walk& walk, const RayData& ray) const { return walk.base + (Base::result(walk, ray) - walk.base) * this->r; }
 
   Theory theory(const RayData&, const RayProfile&, int, Quantity) const { return {}; }
 };
