@@ -28,7 +28,7 @@ namespace nullmark {
 //       the state of one sample
 //   void init(Walk&, const RayData&, Flight&, auto& rng) const
 //   bool propose(Walk&, const RayData&, Flight&, auto& rng) const
-//       true: "look up the extinction at flight.position()"
+//       true: "look up the extinction at flight.position()"; flight.lookups() is the number of lookups before it
 //   void consume(Walk&, const RayData&, const Flight&, const Value& extinction, auto& rng) const
 //   Value result(const Walk&, const RayData&) const
 //       the transmittance estimate
@@ -85,7 +85,7 @@ namespace nullmark {
 //       walks run side by side in registers, in double and in float, of 3 and 4 channels in double: Walk holds one to six Value,
 //       Distance<Value>, Truth<Value> or structs of them, which the loop no longer changes once a walk has ended;
 //       init, propose, consume and result take ray, flight and stream as auto, and branch by select() and flight.next(rng, alive)
-//       where walks can differ (see lane_kernel.h).  flight.lookups() is one number for all walks of a register
+//       where walks can differ (see lane_kernel.h).  flight.lookups() cannot differ
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
 //       the harness fills exact_depth, knots, distance_at_depth, shares
 //

@@ -75,8 +75,7 @@ struct BidirectionalMis {
       return false;
     }
     walk.backwards.push_back({depth, nearer, {}});
-    flight.start(ray.majorant);
-    return flight.advance_to(depth);
+    return flight.land(depth);
   }
 
   void consume(Walk& walk, const MediumRay<Value>&, const Flight& at, const Value& extinction, auto&) const {

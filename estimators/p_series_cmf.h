@@ -20,8 +20,6 @@ struct PowerSeriesCmf {
   static constexpr bool kLanes = true;
 
   static constexpr Real kShare = 0.99;
-  /// In float a thinner ray may be empty; no term but the zeroth counts.
-  static constexpr Real kThinnest = 0x1p-100;
   /// Beyond it a walk takes more lookups than one may.
   static constexpr Real kDeepest = 0x1p31;
 
@@ -36,7 +34,7 @@ struct PowerSeriesCmf {
     ray.always = 0;
     if (!(ray.majorant.total_depth() < kDeepest)) return;
     ray.tail.set_up(ray.majorant.total_depth());
-    ray.always = ray.majorant.total_depth() > kThinnest ? static_cast<Real>(ray.tail.first_at_most(1 - kShare)) : 0;
+    ray.always = ray.majorant.total_depth() > 0 ? static_cast<Real>(ray.tail.first_at_most(1 - kShare)) : 0;
   }
 
   struct Walk {
@@ -50,6 +48,8 @@ struct PowerSeriesCmf {
   }
 
   auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    const auto lands = flight.total_depth() > 0;  // a depth may be above 0 in double alone
+    if (none(lands)) return lands;
     const std::uint32_t i = flight.lookups() + 1;
     const Real chance = i > ray.always ? ray.majorant.total_depth() / i : 1;
     const auto goes_on = walk.u < chance;

@@ -51,7 +51,7 @@ struct PowerSeriesCumulative {
     walk.done = !goes_on;
     walk.u = walk.u / chance;
     walk.series.at.weight = walk.series.at.weight / select(goes_on, chance, Distance<Value>(1));
-    walk.series.add(select(goes_on, Distance<Value>(1), Distance<Value>(kInfinity)));
+    walk.series.add(select(goes_on, Distance<Value>(1), Distance<Value>(kInfinity)));  // nothing for a walk that ends
   }
 
   Value result(const Walk& walk, const auto&) const { return walk.series.total; }

@@ -49,8 +49,7 @@ struct TaylorPinkNoise {
     const Real depth = ray.majorant.total_depth();
     ++walk.order;
     if (!(depth > 0) || !(rng.uniform() * walk.order < 1 + (walk.order - 1) * c * c)) return false;
-    flight.start(ray.majorant);
-    return flight.advance_to(rng.uniform() * depth);
+    return flight.land(rng.uniform() * depth);
   }
 
   void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto&) const {

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
+#include <limits>
 
 #include "estimators/estimator.h"
 #include "estimators/theory/debiased_theory.h"

@@ -122,7 +122,7 @@ struct FractalNoise {
   };
 
   /// A coordinate's lattice cell and smoothstep weight.
-  struct JsonNode {
+  struct Place {
     int cell;
     Real weight;
   };
@@ -139,7 +139,7 @@ struct FractalNoise {
     return smaller(Lanes<Real, N>(1), larger(Lanes<Real, N>(0), (p - lo[axis]) * inverse_extent_[axis]));
   }
 
-  static JsonNode place(Real u, int cells) {
+  static Place place(Real u, int cells) {
     const Real x = u * cells;
     const int cell = std::min(static_cast<int>(x), cells - 1);
     const Real t = x - cell;
@@ -150,7 +150,7 @@ struct FractalNoise {
     return blend(octave, place(u[0], octave.cells), place(u[1], octave.cells), place(u[2], octave.cells));
   }
 
-  Real blend(const Octave& octave, JsonNode x, JsonNode y, JsonNode z) const {
+  Real blend(const Octave& octave, Place x, Place y, Place z) const {
     const auto row = static_cast<std::size_t>(octave.cells) + 1;
     const float* v = lattice_.data() + octave.offset +
                      (static_cast<std::size_t>(z.cell) * row + static_cast<std::size_t>(y.cell)) * row +
@@ -192,9 +192,9 @@ struct FractalNoise {
 
   /// Ends of [a, b] and the lattice planes between them.  Sums of media ask for bounds along every leg of a path, so the usual
   /// number is not allocated.
-  static boost::container::small_vector<JsonNode, 64> places(Real a, Real b, int cells) {
-    const JsonNode first = place(a, cells), last = place(b, cells);
-    boost::container::small_vector<JsonNode, 64> all = {first};
+  static boost::container::small_vector<Place, 64> places(Real a, Real b, int cells) {
+    const Place first = place(a, cells), last = place(b, cells);
+    boost::container::small_vector<Place, 64> all = {first};
     for (int plane = first.cell + 1; plane <= last.cell; ++plane) all.push_back({plane, 0});
     all.push_back(last);
     return all;
@@ -204,9 +204,9 @@ struct FractalNoise {
     const auto xs = places(a[0], b[0], octave.cells), ys = places(a[1], b[1], octave.cells),
                zs = places(a[2], b[2], octave.cells);
     Real minimum = 1, maximum = 0;
-    for (const JsonNode z : zs)
-      for (const JsonNode y : ys)
-        for (const JsonNode x : xs) {
+    for (const Place z : zs)
+      for (const Place y : ys)
+        for (const Place x : xs) {
           const Real value = blend(octave, x, y, z);
           minimum = std::min(minimum, value);
           maximum = std::max(maximum, value);

@@ -10,12 +10,6 @@ namespace nullmark {
 
 /// e^{-(E+O)/2} - (e^{-E} + e^{-O})/2 = -e^{-min} (1 - e^{-|E-O|/2})^2/2: a march of twice as many steps less the mean of the two
 /// marches, of optical depths E and O, that make it up.
-inline Real march_difference(Real even, Real odd) {
-  const Real closer = one_minus_exponential(-std::abs(even - odd) / 2);
-  return -exponential(-std::min(even, odd)) * closer * closer / 2;
-}
-
-/// Of each channel and walk.
 template <class Value>
 [[gnu::always_inline]] inline Value march_difference(const Value& even, const Value& odd) {
   const Value closer = one_minus_exponential(Value(magnitude(Value(even - odd)) * -.5));

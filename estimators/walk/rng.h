@@ -45,7 +45,7 @@ class Rng {
     return static_cast<Real>(next() >> 11) * 0x1p-53;
   }
 
-  /// Of a walk that goes on.
+  /// The same; lanes count such draws for the walks that go on alone.
   Real uniform(bool) { return uniform(); }
 
   /// Unit exponential -log(1 - u); 1 - u is exact, so u = 0 gives 0 and u = 1 - 2^-53 gives 36.7.

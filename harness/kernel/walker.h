@@ -182,7 +182,6 @@ class EstimatorWalker final : public Walker<Outside> {
   /// Walks to the end of the ray or of the budget.
   [[gnu::flatten]] Flight walk(State& state, const PathScene<Outside>& path_scene, Rng& rng, EventBudget& budget,
                                Counters& counters) const {
-    std::uint64_t lookups = 0;
     const Vec3 origin = state.local.origin, direction = state.local.direction;
     const auto look_up = [&](const Walk& walk, const Flight& flight) {
       const Real t = flight.position();
@@ -193,7 +192,6 @@ class EstimatorWalker final : public Walker<Outside> {
       } else {
         path_scene.medium->extinction({&p.x(), &p.y(), &p.z(), 1}, state.extinction.data());
       }
-      ++lookups;
       const Value extinction = load<Value>(state.extinction.data(), path_scene.channels);
       if constexpr (!Traits::kIgnoresMajorant)
         audit_majorant(largest(extinction), state.ray.majorant.rate_on_the_way(flight.piece()), counters);
@@ -202,9 +200,9 @@ class EstimatorWalker final : public Walker<Outside> {
     };
     const Flight end = walk_once(
         estimator_, state.walk, state.ray, rng, [&] { return !budget.exhausted(); }, look_up);
-    counters.lookups += lookups;
+    counters.lookups += end.lookups();
     if constexpr (!Traits::kIgnoresMajorant) {
-      counters.null_collisions += lookups;
+      counters.null_collisions += end.lookups();
       if constexpr (Traits::kRealCollisions)
         counters.null_collisions -= static_cast<std::uint64_t>(estimator_.real_collisions(state.walk, state.ray));
     }

@@ -101,13 +101,23 @@ Evaluated<T> exponential(const Colours<T>& x) {
   return result;
 }
 
+/// f of every number, one after the other: for functions that have no form in lanes.
+template <class Function>
+Real one_by_one(Real x, const Function& f) {
+  return f(x);
+}
+template <class T, class Function>
+Evaluated<T> one_by_one(const Colours<T>& x, const Function& f) {
+  return x.unaryExpr([&](Real number) { return f(number); });
+}
+
 template <class T>
 Evaluated<T> cosine(const Colours<T>& x) {
-  return x.unaryExpr([](Real number) { return cosine(number); });
+  return one_by_one(x, [](Real number) { return cosine(number); });
 }
 template <class T>
 Evaluated<T> one_minus_exponential(const Colours<T>& x) {
-  return x.unaryExpr([](Real number) { return one_minus_exponential(number); });
+  return one_by_one(x, [](Real number) { return one_minus_exponential(number); });
 }
 
 /// sgn(x) |x|^(1/2), and what undoes it.
@@ -166,16 +176,6 @@ inline bool none(bool x) { return !x; }
 template <class Value, std::integral Index>
 const Value& entry(const std::vector<Value>& table, Index i) {
   return table[static_cast<std::size_t>(i)];
-}
-
-/// f of every number, one after the other: for functions that have no form in lanes.
-template <class Function>
-Real one_by_one(Real x, const Function& f) {
-  return f(x);
-}
-template <class T, class Function>
-Evaluated<T> one_by_one(const Colours<T>& x, const Function& f) {
-  return x.unaryExpr([&](Real number) { return f(number); });
 }
 
 /// Whether every channel is 0.
