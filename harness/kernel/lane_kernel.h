@@ -63,7 +63,7 @@ template <class Aggregate, class Visit>
 /// The loop of BlockKernel with N walks per register, over C channels: the same estimator source over Lanes or LaneColours, the
 /// same steps, and in double the same samples bit for bit.  All walks of a block take a step together.  The numbers of an ended
 /// walk stay what they were at its end until ended walks leave the block and the others are compacted.  An estimator takes part
-/// by `static constexpr bool kLanes = true`, with a Walk that holds only Value, Distance<Value> and Truth<Value>, and with
+/// by `static constexpr bool kLanes = true`, with a Walk of Value, Distance<Value>, Truth<Value> and structs of them, and with
 /// functions that take ray, flight and stream as auto.  Lanes answer transmittance and optical depth.  In double the base answers
 /// the other quantities; float has no others.
 template <template <class> class Estimator, class T, std::size_t N = kNativeLanes<T>, std::size_t C = 1>
@@ -205,8 +205,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
           break;
         }
         const auto& [x, y, z] = state.points;
-        // Lanes beyond the last walk take no lookup: one may cost more than a step.
-        medium.extinction(BasicPoints<T>{x.data(), y.data(), z.data(), tally.walks}, state.extinction.data());
+        medium.extinction(BasicPoints<T>{x.data(), y.data(), z.data(), looked_up(tally.walks)}, state.extinction.data());
         if (rates.has_several())
           go_on<true>(lanes, step, tally);
         else
@@ -219,6 +218,10 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       counters.violations += tally.violations;
       if constexpr (!Traits::kIgnoresMajorant) counters.null_collisions += tally.lookups - tally.real;
     }
+
+    /// Number of lanes that look the medium up.  Where the last register is at most half full, its walks look up one by one: the
+    /// lookups of its idle lanes may cost more than a step.
+    static std::size_t looked_up(std::size_t walks) { return walks % N <= N / 2 ? walks : (walks + N - 1) / N * N; }
 
     /// Lanes from k on that hold a walk; all but the last register are full.
     [[gnu::always_inline]] static Mask there(std::size_t k, const Tally& tally) {

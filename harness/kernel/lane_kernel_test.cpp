@@ -149,6 +149,43 @@ TEST(Lanes, DeepSeriesAreTheSameAtEveryWidth) {
   }
 }
 
+/// Constant extinction leaves no variance, and in float no rounding that grows with the lookups: a verdict that expects none
+/// would FAIL the longest walks.
+TEST(Lanes, LongMarchesInFloatKeepTheirDigits) {
+  constexpr std::size_t kSamples = 1 << 16;
+  const Case constant = cases()[0];
+  const EstimatorTemplate<Telescoping> telescoping;
+  const Real exact = sampled(*telescoping.kernel(1), constant, 2).values[0];
+  const Sampled single = sampled(*telescoping.kernel(1, Precision::float32), constant, kSamples);
+  for (const Real value : single.values) ASSERT_NEAR(value, exact, 4 * 0x1p-24 * exact);
+  EXPECT_GT(*std::max_element(single.lookups.begin(), single.lookups.end()), 500u);
+}
+
+/// A constant medium that counts the points it is asked for.
+class Counting final : public Medium {
+ public:
+  using Medium::extinction;
+  Box bounds() const override { return {Vec3::Zero(), Vec3::Ones()}; }
+  void extinction(const Points& points, Real* out) const override {
+    asked += points.size;
+    std::fill_n(out, points.size, 1.);
+  }
+  Extrema extrema(const Box&) const override { return Extrema::grey(1, 1, 1); }
+
+  mutable std::size_t asked = 0;
+};
+
+/// Where lookups are expensive, those of idle lanes would take most of the time.
+TEST(Lanes, IdleLanesOfAHalfEmptyRegisterLookNothingUp) {
+  for (const Precision precision : {Precision::float64, Precision::float32}) {
+    const auto medium = std::make_shared<const Counting>();
+    const Case few{"counting", medium, std::make_shared<GlobalMajorant>(*medium, 1), cases()[0].world};
+    const Sampled marched = sampled(*EstimatorTemplate<RayMarching>().kernel(1, precision), few, 2);
+    EXPECT_EQ(marched.counters.lookups, 2 * 32u);
+    EXPECT_EQ(medium->asked, 2 * 32u);
+  }
+}
+
 /// A ray that misses the medium has nothing to look up.
 TEST(Lanes, AnEmptyRayIsPassed) {
   Case with = cases()[0];
