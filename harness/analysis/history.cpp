@@ -69,8 +69,9 @@ void refuse_other_configurations(const std::vector<HistoryResult>& results) {
       throw InputError(fmt::format("{}: is of configuration \"{}\", and {} of \"{}\"; expected results of one configuration",
                                    other.file, other.run.name, first.file, first.run.name));
     if (!shares)
-      throw InputError(
-          fmt::format("{}: has no cell in common with {}; expected results of one configuration", other.file, first.file));
+      throw InputError(fmt::format("{}: has no cell in common with {}; expected {}", other.file, first.file,
+                                   first.partial && other.partial ? "what `nullmark merge` makes of the shards of one run"
+                                                                  : "results of one configuration"));
   }
 }
 

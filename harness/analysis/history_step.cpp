@@ -95,7 +95,7 @@ class StepComparer {
   void match() {
     std::map<std::string, const CellRecord*> earlier;
     for (const CellRecord& record : before_.run.cells) earlier.emplace(record.cell.name, &record);
-    std::size_t left_out = 0, in_part = 0;
+    std::size_t absent = 0, not_run = 0, in_part = 0;
     for (const CellRecord& after : after_.run.cells) {
       ++step_.cells;
       const auto at = earlier.find(after.cell.name);
@@ -109,13 +109,13 @@ class StepComparer {
       else if (!before && !before_.partial)
         changed(after.cell.name, Change::came, "", marked_word(after), "");
       else
-        ++left_out;
+        ++(before ? not_run : absent);
     }
     for (const CellRecord& before : before_.run.cells) {
       if (!earlier.contains(before.cell.name)) continue;
       ++step_.cells;
       if (after_.partial)
-        ++left_out;
+        ++absent;
       else
         changed(before.cell.name, Change::went, marked_word(before), "", "");
     }
@@ -125,8 +125,12 @@ class StepComparer {
                       "`nullmark run CONFIG --resume`",
                       in_part, in_part == 1 ? "" : "s"));
     tell_seeds();
-    if (left_out > 0)
-      step_.notes.push_back(fmt::format("{} cell{} not selected in both, or not run", left_out, left_out == 1 ? "" : "s"));
+    if (absent > 0)
+      step_.notes.push_back(fmt::format("{} cell{} in one of the results only, for {}", absent, absent == 1 ? "" : "s",
+                                        before_.partial && after_.partial
+                                            ? "both hold a part of the cells: `nullmark merge` joins shards of one run"
+                                            : "the other holds a part of the cells"));
+    if (not_run > 0) step_.notes.push_back(fmt::format("{} cell{} not run in both results", not_run, not_run == 1 ? "" : "s"));
   }
 
   void add_pair(const CellRecord& before, const CellRecord& after) {

@@ -165,7 +165,27 @@ TEST(History, DoesNotMissCellsThatWereNotSelected) {
   const HistoryStep gone = last({dated(kOld), dated(kNew, part)}), back = last({dated(kOld, part), dated(kNew)});
   EXPECT_EQ(gone.changed + back.changed, 0u);
   EXPECT_EQ(gone.compared, 2u);
-  EXPECT_EQ(gone.notes.at(0), "1 cell not selected in both, or not run");
+  EXPECT_EQ(gone.notes.at(0), "1 cell in one of the results only, for the other holds a part of the cells");
+}
+
+TEST(History, NamesMergeForShardsAndCellsThatNeverRan) {
+  const auto shard_of = [](const char* start, const char* shard, std::ptrdiff_t first, std::ptrdiff_t last) {
+    return dated(start, [=](RunRecord& run) {
+      run.cells = std::vector<CellRecord>(run.cells.begin() + first, run.cells.begin() + last);
+      run.provenance["shard"] = fmt::format("\"{}\"", shard);
+    });
+  };
+  EXPECT_EQ(last({shard_of(kOld, "1/2", 0, 2), shard_of(kNew, "2/2", 1, 3)}).notes.at(0),
+            "2 cells in one of the results only, for both hold a part of the cells: `nullmark merge` joins shards of one run");
+  try {
+    last({shard_of(kOld, "1/2", 0, 1), shard_of(kNew, "2/2", 1, 3)});
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("expected what `nullmark merge` makes of the shards"), std::string::npos)
+        << error.what();
+  }
+  const auto skipped = [](RunRecord& run) { run.cells[1] = unsampled(run.cells[1], Status::skipped, "no such medium"); };
+  EXPECT_EQ(last({dated(kOld, skipped), dated(kNew, skipped)}).notes.at(0), "1 cell not run in both results");
 }
 
 /// The results of a shard, whose cells are all drawn in part.
@@ -230,7 +250,7 @@ TEST(History, DoesNotCallCellsGoneThatAreDrawnInPartOrWereNeverStarted) {
   };
   const HistoryStep gone = last({dated(kOld), dated(kNew, without)}), back = last({dated(kOld, without), dated(kNew)});
   EXPECT_EQ(gone.changed + back.changed, 0u);
-  EXPECT_EQ(gone.notes.at(0), "1 cell not selected in both, or not run");
+  EXPECT_EQ(gone.notes.at(0), "1 cell in one of the results only, for the other holds a part of the cells");
 }
 
 TEST(History, SaysWhyErrorsAreNotCompared) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "harness/model/metrics.h"
 #include "harness/model/names.h"
@@ -35,6 +36,12 @@ struct Point {
   Real bias, error;
 };
 
+std::size_t numbers_of_steps(const std::vector<Point>& points) {
+  std::set<int> steps;
+  for (const Point& point : points) steps.insert(point.steps);
+  return steps.size();
+}
+
 OrderFit fit(const std::string& name, Real claimed, std::vector<Point> points) {
   OrderFit result;
   result.name = name;
@@ -59,8 +66,8 @@ OrderFit fit(const std::string& name, Real claimed, std::vector<Point> points) {
     wxy += weight * x * y;
   }
   if (result.steps.size() < kFewestSteps) {
-    result.reason =
-        fmt::format("order not resolved: {} of {} biases stand out of their noise", result.steps.size(), points.size());
+    result.reason = fmt::format("order not resolved: the bias stands out of its noise at {} of {} numbers of steps",
+                                result.steps.size(), numbers_of_steps(points));
     return result;
   }
   const Real spread = w * wxx - wx * wx;
@@ -112,7 +119,7 @@ std::vector<OrderFit> fit_orders(const std::vector<CellRecord>& cells) {
   }
   std::vector<OrderFit> fits;
   for (auto& [name, one] : series)
-    if (one.points.size() >= kFewestSteps) fits.push_back(fit(name, one.claimed, std::move(one.points)));
+    if (numbers_of_steps(one.points) >= kFewestSteps) fits.push_back(fit(name, one.claimed, std::move(one.points)));
   return fits;
 }
 
