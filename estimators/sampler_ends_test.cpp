@@ -81,8 +81,9 @@ TEST(Sampler, NothingIsUndefinedAtTheEndsOfRanges) {
           expect_finite<NullCollisionTracking, Real>(medium, looseness, set);
           expect_finite<NullCollisionTracking, Spectrum>(spectral, looseness, set);
         }
-      for (const char* scheme : {"maximum", "average", "history_aware_maximum", "history_aware_average"})
-        for (const char* control : {"none", "minimum"}) {
+      for (const SpectralScheme scheme : {SpectralScheme::maximum, SpectralScheme::average, SpectralScheme::history_aware_maximum,
+                                          SpectralScheme::history_aware_average})
+        for (const SpectralControl control : {SpectralControl::none, SpectralControl::minimum}) {
           const auto set = [&](auto& e) {
             e.scheme = scheme;
             e.control = control;

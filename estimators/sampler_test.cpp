@@ -68,7 +68,7 @@ TEST(Sampler, GreyTrackersKeepTheLawOfFreePaths) {
     e.controls = {0.1, 0.15};
   });
   expect_grey_law<SpectralTracking>(kDefault, {1, 3, 0.7});
-  expect_grey_law<SpectralTracking>([](auto& e) { e.control = "minimum"; }, {1, 3, 0.7});
+  expect_grey_law<SpectralTracking>([](auto& e) { e.control = SpectralControl::minimum; }, {1, 3, 0.7});
   expect_grey_law<HeroWavelengthTracking>(kDefault);
   expect_grey_law<NullCollisionTracking>(kDefault, {1, 3, 0.7});
   expect_grey_law<NullCollisionTracking>([](auto& e) { e.roulette = "three"; }, {1, 0.7});

@@ -10,6 +10,12 @@
 
 namespace nullmark {
 
+/// What the chances of events are proportional to.
+enum class SpectralScheme { maximum, average, history_aware_maximum, history_aware_average };
+
+/// Extinction whose collisions take no lookup.
+enum class SpectralControl { none, minimum, average, given };
+
 /// Spectral tracking [Kutz, Habel, Li, Novák 2017, Sec. 5]: one walk for all channels l; a tentative collision is the event k of
 /// absorption, scattering, null with probability P_k = R_k/sum R and multiplies the weight of each channel by mu_k,l/(mub P_k).
 ///
@@ -34,7 +40,8 @@ struct SpectralTracking {
   static constexpr SampleRange kRange = std::is_same_v<Value, Real> ? SampleRange::unit : SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
 
-  std::string scheme = "history_aware_average", control = "none";
+  SpectralScheme scheme = SpectralScheme::history_aware_average;
+  SpectralControl control = SpectralControl::none;
   std::vector<Real> controls;
 
   void parameters(ParameterVisitor& visit) {
@@ -48,7 +55,7 @@ struct SpectralTracking {
 
   void check(const MatterBounds& medium) const {
     const auto given = static_cast<Eigen::Index>(controls.size());
-    if ((control == "given") == controls.empty() || (given > 1 && given != medium.minimum.size()))
+    if ((control == SpectralControl::given) == controls.empty() || (given > 1 && given != medium.minimum.size()))
       throw ParameterError("controls", "found " + std::to_string(given) + " numbers; control \"given\" takes one, or " +
                                            std::to_string(medium.minimum.size()) + ", the others take none");
   }
@@ -58,7 +65,7 @@ struct SpectralTracking {
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
   /// Collisions of the control are no lookups.
-  bool flies_once(int) const { return control == "none"; }
+  bool flies_once(int) const { return control == SpectralControl::none; }
 
   /// Of a segment: extinctions whose collisions take no lookup, and the most by which the medium's differs from them.
   struct Control {
@@ -71,21 +78,22 @@ struct SpectralTracking {
   };
 
   void prepare(RayData& ray) const {
-    ray.by_maximum = scheme == "maximum" || scheme == "history_aware_maximum";
-    ray.by_history = scheme == "history_aware_maximum" || scheme == "history_aware_average";
+    using enum SpectralScheme;
+    ray.by_maximum = scheme == maximum || scheme == history_aware_maximum;
+    ray.by_history = scheme == history_aware_maximum || scheme == history_aware_average;
     ray.control.clear();
-    if (control == "none") return;
+    if (control == SpectralControl::none) return;
     for (const Segment& segment : ray.bounds.segments()) {
       const Value least = load<Value>(segment.extinction.minimum.data(), ray.channels),
                   most = load<Value>(segment.extinction.maximum.data(), ray.channels);
-      const Value all = control == "minimum"   ? least
-                        : control == "average" ? load<Value>(segment.extinction.average.data(), ray.channels)
-                                               : given(ray);
+      const Value all = control == SpectralControl::minimum   ? least
+                        : control == SpectralControl::average ? load<Value>(segment.extinction.average.data(), ray.channels)
+                                                              : given(ray);
       Control split{all, (1 - ray.albedo) * all, ray.albedo * all, all};
       if (ray.albedo_field) {
         const Value low = load<Value>(ray.albedo_field->least(ray.channels).data(), ray.channels);
-        split.scatter = control == "minimum" ? Value(low * all) : Value((low + ray.albedo) / 2 * all);
-        if (control != "minimum") split.absorb = all - split.scatter;
+        split.scatter = control == SpectralControl::minimum ? Value(low * all) : Value((low + ray.albedo) / 2 * all);
+        if (control != SpectralControl::minimum) split.absorb = all - split.scatter;
         split.all = split.absorb + split.scatter;
       }
       const Value above = most - split.all, below = split.all - least;
@@ -168,7 +176,7 @@ struct SpectralTracking {
 
  private:
   /// Whether residuals may be negative.
-  bool beyond_minimum() const { return control == "average" || control == "given"; }
+  bool beyond_minimum() const { return control == SpectralControl::average || control == SpectralControl::given; }
 
   Value given(const RayData& ray) const {
     Value all = ray.value(controls[0]);

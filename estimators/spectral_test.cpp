@@ -2,6 +2,7 @@
 
 #include "estimators/spectral.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,6 +25,9 @@ namespace {
 
 using namespace sampler_test;
 
+constexpr SpectralScheme kSchemes[] = {SpectralScheme::maximum, SpectralScheme::average, SpectralScheme::history_aware_maximum,
+                                       SpectralScheme::history_aware_average};
+
 /// mu_s = (1, 2, 4), mu_a = (.5, .2, .1): the constant chromatic medium of the tables.
 struct Chromatic {
   std::shared_ptr<const Medium> medium = std::make_shared<Spectral>(constant(1), std::vector<Real>{1.5, 2.2, 4.1});
@@ -39,16 +43,48 @@ struct Chromatic {
   }
 };
 
+/// Gives every choice one word.
+struct Says final : ParameterVisitor {
+  explicit Says(std::string one) : word(std::move(one)) {}
+  void number(const char*, Real&, Range, const char*, const char*) override {}
+  void integer(const char*, int&, int, int, const char*) override {}
+  void flag(const char*, bool&, const char*) override {}
+  void choice(const char* name, std::string& value, std::initializer_list<const char*>, const char*) override {
+    if (name == std::string("scheme")) value = word;
+  }
+  void text(const char*, std::string&, const char*) override {}
+  void numbers(const char*, std::vector<Real>&, int, int, Range, const char*, const char*) override {}
+  void texts(const char*, std::vector<std::string>&, const char*) override {}
+  void object(const char*, std::string&, const char*) override {}
+  void point(const char*, Vec3&, const char*, const char*) override {}
+  std::string word;
+};
+
+TEST(Spectral, SchemesGoByTheirWords) {
+  const auto scheme = [](const char* word) {
+    Says says(word);
+    SpectralTracking<Real> spectral;
+    spectral.parameters(says);
+    return spectral.scheme;
+  };
+  EXPECT_EQ(scheme("maximum"), SpectralScheme::maximum);
+  EXPECT_EQ(scheme("average"), SpectralScheme::average);
+  EXPECT_EQ(scheme("history_aware_maximum"), SpectralScheme::history_aware_maximum);
+  EXPECT_EQ(scheme("history_aware_average"), SpectralScheme::history_aware_average);
+  EXPECT_THROW(scheme("none"), ParameterError);
+}
+
 /// Variances of the escape weight and largest weights seen.
 TEST(Spectral, SchemesHaveTheStatedVariances) {
   struct Row {
-    const char* scheme;
+    SpectralScheme scheme;
     Real red, green, blue;
   };
   for (const Row& row :
-       {Row{"maximum", 1.52401, .184406, .013627}, Row{"average", 1.31605, .169335, .013617},
-        Row{"history_aware_maximum", .359939, .096333, .013626}, Row{"history_aware_average", .396968, .098865, .013616}}) {
-    SCOPED_TRACE(row.scheme);
+       {Row{SpectralScheme::maximum, 1.52401, .184406, .013627}, Row{SpectralScheme::average, 1.31605, .169335, .013617},
+        Row{SpectralScheme::history_aware_maximum, .359939, .096333, .013626},
+        Row{SpectralScheme::history_aware_average, .396968, .098865, .013616}}) {
+    SCOPED_TRACE(static_cast<int>(row.scheme));
     const auto walked = Chromatic{}.walked<SpectralTracking>([&](auto& e) { e.scheme = row.scheme; });
     EXPECT_NEAR(*walked->theory(0).variance, row.red, 6e-6);
     EXPECT_NEAR(*walked->theory(1).variance, row.green, 2e-6);
@@ -67,7 +103,7 @@ TEST(Spectral, SchemesHaveTheStatedVariances) {
       EXPECT_NEAR(w.mean(), walked->transmittance(1)[c], kSigmas * w.error());
     }
     EXPECT_NEAR(lookups.mean(), *walked->theory(0).lookups, kSigmas * lookups.error());
-    const bool by_history = std::string(row.scheme).starts_with("history");
+    const bool by_history = row.scheme >= SpectralScheme::history_aware_maximum;
     EXPECT_EQ(largest_weight < 3, by_history) << largest_weight;
   }
   const auto best = Chromatic{}.walked<SpectralTracking>(kDefault);
@@ -85,10 +121,11 @@ TEST(Spectral, HeroWavelengthHasTheLawOfHistoryAwareAverage) {
 }
 
 TEST(Spectral, EventsFollowTheLawPerChannel) {
-  for (const char* scheme : {"maximum", "average", "history_aware_maximum", "history_aware_average"})
-    for (const char* control : {"none", "minimum"})
+  for (const SpectralScheme scheme : kSchemes)
+    for (const SpectralControl control : {SpectralControl::none, SpectralControl::minimum})
       for (const bool draws : {true, false}) {
-        SCOPED_TRACE(std::string(scheme) + " " + control + (draws ? "" : " without absorption"));
+        SCOPED_TRACE(fmt::format("scheme {}, control {}{}", static_cast<int>(scheme), static_cast<int>(control),
+                                 draws ? "" : ", without absorption"));
         const auto set = [&](auto& e) {
           e.scheme = scheme;
           e.control = control;
@@ -120,16 +157,16 @@ TEST(Spectral, EventsFollowTheLawPerChannel) {
 TEST(Spectral, DecompositionSavesLookups) {
   const auto channels = std::make_shared<PerChannel>(
       std::vector<std::shared_ptr<const Medium>>{linear(0.3, 1), rising_exponential(2, -1), constant(0.8)});
-  const auto walked = [&](const char* scheme, const char* control) {
+  const auto walked = [&](SpectralScheme scheme, SpectralControl control) {
     return std::make_unique<HandWalked<SpectralTracking, Spectrum>>(with<SpectralTracking, Spectrum>([&](auto& e) {
                                                                       e.scheme = scheme;
                                                                       e.control = control;
                                                                     }),
                                                                     channels, 1, 1, 2);
   };
-  for (const char* scheme : {"maximum", "average", "history_aware_average"}) {
-    const auto plain = walked(scheme, "none"), split = walked(scheme, "minimum");
-    EXPECT_LT(*split->theory(0).lookups, 0.8 * *plain->theory(0).lookups) << scheme;
+  for (const SpectralScheme scheme : {SpectralScheme::maximum, SpectralScheme::average, SpectralScheme::history_aware_average}) {
+    const auto plain = walked(scheme, SpectralControl::none), split = walked(scheme, SpectralControl::minimum);
+    EXPECT_LT(*split->theory(0).lookups, 0.8 * *plain->theory(0).lookups) << static_cast<int>(scheme);
     expect_theory(*plain);
     expect_theory(*split);
   }
@@ -139,7 +176,7 @@ TEST(Spectral, DecompositionSavesLookups) {
 /// with history-aware average the mean over the channels is 1 to 1e-12 and no weight exceeds their number, ever; with the other
 /// schemes weights grow.
 TEST(Spectral, HistoryAwareAverageKeepsTheMeanWeightOverAMillionPaths) {
-  const auto longest = [](const char* scheme, int paths, Real& worst_mean, int& most_events) {
+  const auto longest = [](SpectralScheme scheme, int paths, Real& worst_mean, int& most_events) {
     const auto walked = Chromatic{}.walked<SpectralTracking>([&](auto& e) { e.scheme = scheme; });
     using E = SpectralTracking<Spectrum>;
     constexpr int kMostEvents = 10000;
@@ -170,15 +207,15 @@ TEST(Spectral, HistoryAwareAverageKeepsTheMeanWeightOverAMillionPaths) {
   };
   Real off = 0;
   int events = 0;
-  EXPECT_LE(longest("history_aware_average", 1000000, off, events), 3 * (1 + 1e-12));
+  EXPECT_LE(longest(SpectralScheme::history_aware_average, 1000000, off, events), 3 * (1 + 1e-12));
   EXPECT_LT(off, 1e-12);
   EXPECT_GT(events, 100);
   std::printf("history-aware average: mean weight off by %.2g at most, %d events in the longest path\n", off, events);
   Real ignored = 0;
-  for (const char* scheme : {"maximum", "average", "history_aware_maximum"}) {
+  for (const SpectralScheme scheme : {SpectralScheme::maximum, SpectralScheme::average, SpectralScheme::history_aware_maximum}) {
     const Real largest_weight = longest(scheme, 100000, ignored, events);
-    std::printf("%s: largest weight %.3g\n", scheme, largest_weight);
-    EXPECT_GT(largest_weight, 3) << scheme;
+    std::printf("scheme %d: largest weight %.3g\n", static_cast<int>(scheme), largest_weight);
+    EXPECT_GT(largest_weight, 3) << static_cast<int>(scheme);
   }
 }
 
