@@ -57,6 +57,15 @@ TEST(SummaryOfOwnMeans, ProveNothingOfTheQuantity) {
   EXPECT_EQ(summary_of(marches()).exit, ExitCode::ok) << "an order is a property of the quantity's estimate";
 }
 
+TEST(SummaryOfOrders, TheFirstLineCountsThoseThatFailed) {
+  std::vector<CellRecord> cells = marches();
+  EXPECT_EQ(text_of(cells).find("ORDER FAIL"), std::string::npos);
+  for (CellRecord& cell : cells) cell.order = 2;
+  EXPECT_EQ(summary_of(cells).exit, ExitCode::bias_proven);
+  const std::string text = text_of(cells), first = text.substr(0, text.find('\n'));
+  EXPECT_NE(first.find(", 1 ORDER FAIL"), std::string::npos) << first;
+}
+
 TEST(SummaryOfTrackers, EachThatClaimsMustBeDecidedSomewhere) {
   const CellRecord good = of_tracker(passed(), "ratio"), other = of_tracker(open_as_planned(), "roulette_ratio/share:0.5");
   EXPECT_EQ(summary_of({good, other}).exit, ExitCode::inconclusive);

@@ -27,6 +27,12 @@ std::string marks_among(const RunRecord& run, Kind kind) {
   return text.empty() ? "" : fmt::format(" (of them {})", text);
 }
 
+std::string failed_orders(const Summary& s) {
+  const auto failed =
+      std::count_if(s.orders.begin(), s.orders.end(), [](const OrderFit& fit) { return fit.outcome == Outcome::fail; });
+  return failed > 0 ? fmt::format(", {} ORDER FAIL", failed) : "";
+}
+
 std::string counts(const RunRecord& run, const Summary& s) {
   return fmt::format(
              "{} PASS{}, {} FAIL{}, {} INCONCLUSIVE as planned{}, {} INCONCLUSIVE{}, {} VIOLATED, {} errors, {} not run, {} not "
@@ -34,7 +40,7 @@ std::string counts(const RunRecord& run, const Summary& s) {
              s.pass, marks_among(run, Kind::pass), s.fail, marks_among(run, Kind::fail), s.expected_open,
              marks_among(run, Kind::expected_open), s.unexpected_open, marks_among(run, Kind::unexpected_open), s.violated,
              s.errors, s.not_run, s.untested) +
-         (s.agree + s.differ > 0 ? fmt::format(", {} AGREE, {} DIFFER", s.agree, s.differ) : "");
+         (s.agree + s.differ > 0 ? fmt::format(", {} AGREE, {} DIFFER", s.agree, s.differ) : "") + failed_orders(s);
 }
 
 std::string order_line(const OrderFit& fit) {
@@ -71,9 +77,10 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
   if (summary.never_started > 0)
     lines.push_back(fmt::format("{} cells of the configuration were never started", summary.never_started));
   if (summary.drawn_in_part > 0)
-    lines.push_back(fmt::format(
-        "{} cells are drawn in part: `merge` joins the results of all shards, and `run --resume` draws what is missing",
-        summary.drawn_in_part));
+    lines.push_back(
+        fmt::format("{} cells are drawn in part: `merge` joins the results of all shards, and `run CONFIG --resume -o RESULTS` "
+                    "draws what is missing",
+                    summary.drawn_in_part));
   if (summary.altered > 0) lines.push_back(fmt::format("{} verdicts in the file are not what its figures say", summary.altered));
   lines.insert(lines.end(), summary.disagreements.begin(), summary.disagreements.end());
   lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "harness/model/metrics.h"
 #include "harness/model/names.h"
@@ -27,38 +26,30 @@ std::string without_steps(const CellRecord& record) {
   std::string label = record.cell.estimator->type;
   for (const auto& [name, value] : record.cell.estimator->values)
     if (name != "steps") label += fmt::format("/{}:{}", name, to_text(value));
-  if (record.cell.precision != Precision::float64) label += "/" + to_string(record.cell.precision);
   return fmt::format("{}/{}/{}/{}", label, record.medium->label, to_string(record.cell.quantity), record.ray_set->label);
 }
 
 struct Point {
-  int steps;
   Real bias, error;
 };
 
-std::size_t numbers_of_steps(const std::vector<Point>& points) {
-  std::set<int> steps;
-  for (const Point& point : points) steps.insert(point.steps);
-  return steps.size();
-}
-
-OrderFit fit(const std::string& name, Real claimed, std::vector<Point> points) {
+OrderFit fit(const std::string& name, Real claimed, const std::map<int, Point>& points) {
   OrderFit result;
   result.name = name;
   result.claimed = claimed;
-  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.steps < b.steps; });
   struct Term {
     Real x, y, sigma;
+    bool positive;
   };
   std::vector<Term> terms;
   Real w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0;
-  for (const Point& p : points) {
+  for (const auto& [steps, p] : points) {
     if (!(std::abs(p.bias) > kResolved * p.error)) continue;
-    if (result.steps.empty() || result.steps.back() != p.steps) result.steps.push_back(p.steps);
-    const Real x = -std::log(p.steps), y = std::log(std::abs(p.bias));
+    result.steps.push_back(steps);
+    const Real x = -std::log(steps), y = std::log(std::abs(p.bias));
     // Finite steps are not the limit yet: no point counts as better than 1 %.
     const Real sigma = std::max<Real>(0.01, p.error / std::abs(p.bias)), weight = 1 / (sigma * sigma);
-    terms.push_back({x, y, sigma});
+    terms.push_back({x, y, sigma, p.bias > 0});
     w += weight;
     wx += weight * x;
     wy += weight * y;
@@ -66,23 +57,34 @@ OrderFit fit(const std::string& name, Real claimed, std::vector<Point> points) {
     wxy += weight * x * y;
   }
   if (result.steps.size() < kFewestSteps) {
-    result.reason = fmt::format("order not resolved: the bias stands out of its noise at {} of {} numbers of steps",
-                                result.steps.size(), numbers_of_steps(points));
+    result.reason =
+        fmt::format("order not resolved: the bias stands out of its noise at {} of {} numbers of steps; take more samples",
+                    result.steps.size(), points.size());
     return result;
   }
   const Real spread = w * wxx - wx * wx;
   result.order = (w * wxy - wx * wy) / spread;
   result.half_width = kQuantile * std::sqrt(w / spread);
   const Real start = (wy - result.order * wx) / w;
-  if (std::any_of(terms.begin(), terms.end(),
-                  [&](const Term& term) { return std::abs(term.y - start - result.order * term.x) > kPowerLaw * term.sigma; }))
-    result.reason = "order not resolved: the biases follow no power of the step";
-  else if (result.order + result.half_width < claimed - kTolerance)
+  const Term &last = terms.back(), &before = terms[terms.size() - 2];
+  const Real finest = (last.y - before.y) / (last.x - before.x);
+  const Real finest_half_width = kQuantile * std::hypot(last.sigma, before.sigma) / (before.x - last.x);
+  if (std::any_of(terms.begin(), terms.end(), [&](const Term& term) { return term.positive != last.positive; }))
+    result.reason = "order not resolved: the bias changes its sign; take finer steps";
+  else if (std::any_of(terms.begin(), terms.end(), [&](const Term& term) {
+             return std::abs(term.y - start - result.order * term.x) > kPowerLaw * term.sigma;
+           }))
+    result.reason = "order not resolved: the biases follow no power of the step; take finer steps";
+  else if (result.order + result.half_width >= claimed - kTolerance)
+    if (result.order - result.half_width > claimed - kTolerance)
+      result.outcome = Outcome::pass;
+    else
+      result.reason = "order not resolved: its interval holds the claim and less; take more samples";
+  else if (finest + finest_half_width < claimed - kTolerance && finest <= result.order + kTolerance)
     result.outcome = Outcome::fail;
-  else if (result.order - result.half_width > claimed - kTolerance)
-    result.outcome = Outcome::pass;
   else
-    result.reason = "order not resolved: its interval holds the claim and less";
+    result.reason = fmt::format("order not resolved: it is {:.3f} +- {:.3f} between the two finest steps; take finer ones",
+                                finest, finest_half_width);
   return result;
 }
 
@@ -91,13 +93,15 @@ OrderFit fit(const std::string& name, Real claimed, std::vector<Point> points) {
 std::vector<OrderFit> fit_orders(const std::vector<CellRecord>& cells) {
   struct Series {
     Real claimed;
-    std::vector<Point> points;
+    std::map<int, Point> points;  ///< by numbers of steps
   };
   std::map<std::string, Series> series;
   for (const CellRecord& record : cells) {
     const auto steps = record.cell.estimator->values.find("steps");
     // What is done to samples has a bias of its own.
     if (record.cell.measurement != Measurement{} || !record.outputs.empty()) continue;
+    // Rounding cannot be told from a bias.
+    if (record.cell.precision != Precision::float64) continue;
     if (record.status != Status::ok || record.claims != "consistent" || !record.order || record.channel.empty() ||
         steps == record.cell.estimator->values.end() || !std::holds_alternative<int>(steps->second))
       continue;
@@ -115,11 +119,13 @@ std::vector<OrderFit> fit_orders(const std::vector<CellRecord>& cells) {
       if (!(reference > 0 && slope > 0)) continue;
     }
     auto& [claimed, points] = series.try_emplace(without_steps(record), Series{*record.order, {}}).first->second;
-    points.push_back({std::get<int>(steps->second), bias, error / slope});
+    const Point point{bias, error / slope};
+    const auto [at, is_new] = points.try_emplace(std::get<int>(steps->second), point);
+    if (!is_new && point.error < at->second.error) at->second = point;
   }
   std::vector<OrderFit> fits;
-  for (auto& [name, one] : series)
-    if (numbers_of_steps(one.points) >= kFewestSteps) fits.push_back(fit(name, one.claimed, std::move(one.points)));
+  for (const auto& [name, one] : series)
+    if (one.points.size() >= kFewestSteps) fits.push_back(fit(name, one.claimed, one.points));
   return fits;
 }
 

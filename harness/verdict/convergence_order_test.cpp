@@ -85,7 +85,35 @@ TEST(Order, IsNotResolvedByNoise) {
   EXPECT_TRUE(fit_orders(marches({{8, 0.01}, {16, 0.005}}, 1)).empty());
 }
 
+/// Lanes and majorants change no sample of a march: a copy tells nothing new.
+TEST(Order, CopiesDoNotNarrowTheInterval) {
+  const std::vector<CellRecord> once = marches(power(2, 0.2), 2, 1);
+  std::vector<CellRecord> thrice = once;
+  for (int i = 0; i < 2; ++i) thrice.insert(thrice.end(), once.begin(), once.end());
+  ASSERT_EQ(fitted(once).outcome, Outcome::pass);
+  EXPECT_EQ(fitted(thrice).half_width, fitted(once).half_width);
+  // The best known cell counts.
+  std::vector<CellRecord> more = marches(power(2, 0.2), 2, 1);
+  for (CellRecord& cell : more) cell.samples *= 4;
+  more.insert(more.begin(), once.begin(), once.end());
+  EXPECT_LT(fitted(more).half_width, fitted(once).half_width);
+}
+
+TEST(Order, IsNotAskedInFloat) {
+  std::vector<CellRecord> cells = marches(power(0, 1e-7), 2);
+  for (CellRecord& cell : cells) cell.cell.precision = Precision::float32;
+  EXPECT_TRUE(fit_orders(cells).empty());
+}
+
 TEST(Order, IsAClaimOfSmallSteps) {
+  // Steps that begin to see the detail: the order still grows, and the noise of the last bias hides that no power fits.
+  const OrderFit growing = fitted(marches({{1, 0.0416}, {2, 0.0086}, {4, 0.00135}}, 6, 0.005));
+  EXPECT_EQ(growing.outcome, Outcome::inconclusive);
+  EXPECT_LT(growing.order + growing.half_width, 5);
+  EXPECT_NE(growing.reason.find("between the two finest steps; take finer ones"), std::string::npos) << growing.reason;
+  // The finest steps may be of the claimed order.
+  EXPECT_EQ(fitted(marches({{1, 0.04}, {2, 0.015}, {4, 0.0042}}, 2, 0.05)).outcome, Outcome::inconclusive);
+  EXPECT_NE(fitted(marches({{8, 0.01}, {16, 0.005}, {32, -0.0025}}, 2)).reason.find("changes its sign"), std::string::npos);
   // On a deep medium a right-hand rule sees nothing at first, and a left-hand one many times T: orders of the optical depth.
   for (const Real depth : {-20., 20.}) EXPECT_NEAR(fitted(marches(power(1, depth), 1)).order, 1, 1e-6);
   // Steps that skip a medium's detail.
