@@ -56,8 +56,9 @@ struct SpectralTracking {
   void check(const MatterBounds& medium) const {
     const auto given = static_cast<Eigen::Index>(controls.size());
     if ((control == SpectralControl::given) == controls.empty() || (given > 1 && given != medium.minimum.size()))
-      throw ParameterError("controls", "found " + std::to_string(given) + " numbers; control \"given\" takes one, or " +
-                                           std::to_string(medium.minimum.size()) + ", the others take none");
+      throw ParameterError("controls", "has " + std::to_string(given) +
+                                           " numbers; control \"given\" takes one for all channels or one for each of the " +
+                                           std::to_string(medium.minimum.size()) + ", other controls take none");
   }
 
   SampleRange range() const { return beyond_minimum() ? SampleRange::any_sign : kRange; }

@@ -109,9 +109,11 @@ const EstimatorEntry& entry_of(const std::string& type) {
   std::vector<std::string> names;
   for (const ComponentInfo& one : registered(ComponentKind::estimator)) names.push_back(one.name);
   const std::string near = nearest(type, names);
-  throw InputError(
-      fmt::format("unknown estimator \"{}\"{}", type,
-                  near.empty() ? "; `nullmark list estimators` lists them" : fmt::format("; did you mean \"{}\"?", near)));
+  throw InputError(fmt::format("unknown estimator \"{}\"{}", type,
+                               type.find('/') != std::string::npos
+                                   ? "; parameters are given as JSON: {\"type\": \"...\", \"steps\": 8}"
+                               : near.empty() ? "; `nullmark list estimators` lists them"
+                                              : fmt::format("; did you mean \"{}\"?", near)));
 }
 
 /// The tracker with each other value of each parameter that is a choice, one at a time.

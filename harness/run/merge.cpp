@@ -157,7 +157,7 @@ CellRecord joined(const Found& cell, const std::vector<std::string>& names, cons
     }
     if (record->time) whole.time = record->time;
   }
-  whole.reason = "parts of the cell are drawn; `run --resume` draws the others";
+  whole.reason = "parts of the cell are drawn; `run CONFIG --resume -o RESULTS` draws the others";
   return whole;
 }
 

@@ -156,7 +156,7 @@ class CellRun {
   }
 
   bool leave_open(const std::string& why) {
-    record_.reason = why + "; `run --resume` draws what is missing";
+    record_.reason = why + "; `run CONFIG --resume -o RESULTS` draws what is missing";
     open_ = true;
     return false;
   }

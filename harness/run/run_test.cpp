@@ -56,6 +56,7 @@ TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
   };
   refused(R"("medium":{"type":"checkerboard","lo":[2000,0,0],"hi":[2001,1,1]})", "from the origin of its frame");
   refused(R"("medium":"linear","majorant":{"type":"prescribed","value":16385})", "majorant depth 16385");
+  refused(R"("medium":"linear","lanes":false)", "ratio has no walks one at a time in float; expected \"lanes\": true");
   EXPECT_EQ(only_record(R"("medium":{"type":"checkerboard","lo":[1000,0,0],"hi":[1001,1,1]})").status, Status::ok);
   // Every one of 10 000 factors of a weight rounds to the same side, by a share of the mean that sampling does show.
   const CellRecord loose =

@@ -189,7 +189,7 @@ TEST(SplitCells, AVerdictMayAskForMoreThanIsDrawn) {
     open += part.open.size();
     for (const CellRecord& record : part.run.cells) {
       if (record.status == Status::ok) continue;
-      EXPECT_NE(record.reason.find("are wanted and not drawn; `run --resume`"), std::string::npos) << record.reason;
+      EXPECT_NE(record.reason.find("are wanted and not drawn; `run CONFIG --resume -o RESULTS`"), std::string::npos) << record.reason;
     }
     RunOptions options;
     options.timing = false;

@@ -172,7 +172,7 @@ TEST(Albedo, ChromaticControlsMayExceedTheExtinction) {
     }
   }
   EXPECT_NE(error_of(R"({"type":"spectral","control":"given","controls":[1,2]})", R"({"type":"linear","spectrum":[1,2,4]})")
-                .find("found 2 numbers; control \"given\" takes one, or 3"),
+                .find("has 2 numbers; control \"given\" takes one for all channels or one for each of the 3"),
             std::string::npos);
 }
 

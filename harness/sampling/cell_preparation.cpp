@@ -177,6 +177,8 @@ std::string trackers_for(Quantity quantity, int channels) {
 
 std::string CellPreparer::why_not(const Cell& cell, const Component& tracker, const Scene& scene, const Kernel* made) {
   const int channels = scene.medium->medium->channels();
+  if (!made && !cell.lanes && make_estimator(tracker)->kernel(channels, cell.precision))
+    return fmt::format("{} has no walks one at a time in float; expected \"lanes\": true or precision \"double\"", tracker.type);
   if (!made)
     return channels > 1 ? fmt::format("{} channels have no form in float; expected precision \"double\"", channels)
                         : fmt::format("{} has no form in float; expected precision \"double\"", tracker.type);
