@@ -289,11 +289,12 @@ TEST_F(Nothing, RaysThatMissTheMediumTestNothing) {
   ASSERT_EQ(run("run v.json -o r.json"), 0) << read("err");
   for (const CellRecord& record : results("r.json").cells) {
     EXPECT_FALSE(record.verdict);
-    EXPECT_EQ(record.reason, "no ray meets any extinction: nothing was tested");
+    EXPECT_EQ(record.reason, "no ray meets any extinction: nothing was tested; the medium's bounds are [0, 0, 0] to [1, 1, 1]");
   }
   EXPECT_EQ(run("check r.json --junit j.xml"), 5) << read("out");
   EXPECT_NE(read("out").find("0 PASS, 0 FAIL"), std::string::npos) << read("out");
-  EXPECT_NE(read("out").find("2 not tested\nno cell was judged: no ray meets any extinction: nothing was tested (2)\n"),
+  EXPECT_NE(read("out").find("2 not tested\nno cell was judged: no ray meets any extinction: nothing was tested; the medium's "
+                             "bounds are [0, 0, 0] to [1, 1, 1] (2)\n"),
             std::string::npos)
       << read("out");
   EXPECT_NE(read("j.xml").find(R"(failures="0" errors="0" skipped="2")"), std::string::npos) << read("j.xml");

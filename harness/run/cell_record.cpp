@@ -193,7 +193,11 @@ void add_verdict(CellRecord& record, const PreparedCell& prepared, const std::op
   record.verdict = verdict;
   if (verdict && tests_nothing(prepared) && kind_of(record) != Kind::fail) {
     record.verdict.reset();
-    record.reason = "no ray meets any extinction: nothing was tested";
+    const auto& [lo, hi] = prepared.scene->medium->world_bounds;
+    record.reason = fmt::format(
+        "no ray meets any extinction: nothing was tested; the medium's bounds are [{:.6g}, {:.6g}, {:.6g}] to [{:.6g}, {:.6g}, "
+        "{:.6g}]",
+        lo.x(), lo.y(), lo.z(), hi.x(), hi.y(), hi.z());
   }
   if (!verdict && record.reason.empty()) record.reason = why_not_judged(prepared);
 }

@@ -124,7 +124,7 @@ TEST(Run, ABiasIsProvenEvenInVacuum) {
                                  "test.json");
   const std::vector<CellRecord> records = run(cells, 1, {});
   EXPECT_FALSE(records.at(0).verdict);
-  EXPECT_EQ(records[0].reason, "no ray meets any extinction: nothing was tested");
+  EXPECT_EQ(records[0].reason, "no ray meets any extinction: nothing was tested; the medium's bounds are [0, 0, 0] to [1, 1, 1]");
   ASSERT_TRUE(records.at(1).verdict);
   EXPECT_EQ(records[1].verdict->unbiased, Outcome::fail);
 }
