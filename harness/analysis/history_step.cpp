@@ -126,7 +126,7 @@ class StepComparer {
                       in_part, in_part == 1 ? "" : "s"));
     tell_seeds();
     if (absent > 0)
-      step_.notes.push_back(fmt::format("{} cell{} in one of the results only, for {}", absent, absent == 1 ? "" : "s",
+      step_.notes.push_back(fmt::format("{} cell{} in one of the results only, because {}", absent, absent == 1 ? "" : "s",
                                         before_.partial && after_.partial
                                             ? "both hold a part of the cells: `nullmark merge` joins shards of one run"
                                             : "the other holds a part of the cells"));

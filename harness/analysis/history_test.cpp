@@ -165,7 +165,7 @@ TEST(History, DoesNotMissCellsThatWereNotSelected) {
   const HistoryStep gone = last({dated(kOld), dated(kNew, part)}), back = last({dated(kOld, part), dated(kNew)});
   EXPECT_EQ(gone.changed + back.changed, 0u);
   EXPECT_EQ(gone.compared, 2u);
-  EXPECT_EQ(gone.notes.at(0), "1 cell in one of the results only, for the other holds a part of the cells");
+  EXPECT_EQ(gone.notes.at(0), "1 cell in one of the results only, because the other holds a part of the cells");
 }
 
 TEST(History, NamesMergeForShardsAndCellsThatNeverRan) {
@@ -175,8 +175,9 @@ TEST(History, NamesMergeForShardsAndCellsThatNeverRan) {
       run.provenance["shard"] = fmt::format("\"{}\"", shard);
     });
   };
-  EXPECT_EQ(last({shard_of(kOld, "1/2", 0, 2), shard_of(kNew, "2/2", 1, 3)}).notes.at(0),
-            "2 cells in one of the results only, for both hold a part of the cells: `nullmark merge` joins shards of one run");
+  EXPECT_EQ(
+      last({shard_of(kOld, "1/2", 0, 2), shard_of(kNew, "2/2", 1, 3)}).notes.at(0),
+      "2 cells in one of the results only, because both hold a part of the cells: `nullmark merge` joins shards of one run");
   try {
     last({shard_of(kOld, "1/2", 0, 1), shard_of(kNew, "2/2", 1, 3)});
     ADD_FAILURE();
@@ -250,7 +251,7 @@ TEST(History, DoesNotCallCellsGoneThatAreDrawnInPartOrWereNeverStarted) {
   };
   const HistoryStep gone = last({dated(kOld), dated(kNew, without)}), back = last({dated(kOld, without), dated(kNew)});
   EXPECT_EQ(gone.changed + back.changed, 0u);
-  EXPECT_EQ(gone.notes.at(0), "1 cell in one of the results only, for the other holds a part of the cells");
+  EXPECT_EQ(gone.notes.at(0), "1 cell in one of the results only, because the other holds a part of the cells");
 }
 
 TEST(History, SaysWhyErrorsAreNotCompared) {
