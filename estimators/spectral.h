@@ -86,10 +86,7 @@ struct SpectralTracking {
     if (control == SpectralControl::none) return;
     for (const Segment& segment : ray.bounds.segments()) {
       const Value least = load<Value>(segment.extinction.minimum.data(), ray.channels),
-                  most = load<Value>(segment.extinction.maximum.data(), ray.channels);
-      const Value all = control == SpectralControl::minimum   ? least
-                        : control == SpectralControl::average ? load<Value>(segment.extinction.average.data(), ray.channels)
-                                                              : given(ray);
+                  most = load<Value>(segment.extinction.maximum.data(), ray.channels), all = controlled(ray, segment.extinction);
       Control split{all, (1 - ray.albedo) * all, ray.albedo * all, all};
       if (ray.albedo_field) {
         const Value low = load<Value>(ray.albedo_field->least(ray.channels).data(), ray.channels);
@@ -179,7 +176,9 @@ struct SpectralTracking {
   /// Whether residuals may be negative.
   bool beyond_minimum() const { return control == SpectralControl::average || control == SpectralControl::given; }
 
-  Value given(const RayData& ray) const {
+  Value controlled(const RayData& ray, const Extrema& segment) const {
+    if (control == SpectralControl::minimum) return load<Value>(segment.minimum.data(), ray.channels);
+    if (control == SpectralControl::average) return load<Value>(segment.average.data(), ray.channels);
     Value all = ray.value(controls[0]);
     for (std::size_t c = 1; c < controls.size(); ++c) channel(all, static_cast<int>(c)) = controls[c];
     return all;

@@ -95,14 +95,16 @@ class StepComparer {
   void match() {
     std::map<std::string, const CellRecord*> earlier;
     for (const CellRecord& record : before_.run.cells) earlier.emplace(record.cell.name, &record);
-    std::size_t absent = 0, not_run = 0, in_part = 0;
+    std::size_t absent = 0, not_run = 0, in_part = 0, was_in_part = 0;
     for (const CellRecord& after : after_.run.cells) {
       ++step_.cells;
       const auto at = earlier.find(after.cell.name);
       const CellRecord* before = at == earlier.end() ? nullptr : at->second;
       if (before) earlier.erase(at);
-      if (is_drawn_in_part(after) || (before && is_drawn_in_part(*before)))
+      if (is_drawn_in_part(after))
         ++in_part;
+      else if (before && is_drawn_in_part(*before))
+        ++was_in_part;
       else if (before &&
                (is_sampled(*before) || is_sampled(after) || before->status == Status::error || after.status == Status::error))
         add_pair(*before, after);
@@ -124,6 +126,9 @@ class StepComparer {
           fmt::format("{} cell{} drawn in part, so not compared: merge the results of all shards, or draw the rest with "
                       "`nullmark run CONFIG --resume`",
                       in_part, in_part == 1 ? "" : "s"));
+    if (was_in_part > 0)
+      step_.notes.push_back(fmt::format("{} cell{} drawn in part in the earlier result, so not compared", was_in_part,
+                                        was_in_part == 1 ? "" : "s"));
     tell_seeds();
     if (absent > 0)
       step_.notes.push_back(fmt::format("{} cell{} in one of the results only, because {}", absent, absent == 1 ? "" : "s",

@@ -103,7 +103,8 @@ class CommandLine {
     } catch (const CLI::ParseError& error) {
       // Help and version end the parse by throwing as well.
       if (error.get_exit_code() == 0) return static_cast<ExitCode>(app_.exit(error));
-      throw InputError(one_line(error.what()));
+      const bool missing = dynamic_cast<const CLI::RequiredError*>(&error);
+      throw InputError(one_line(error.what()) + (missing ? fmt::format("; `nullmark {} --help` explains it", words[1]) : ""));
     }
     return action_();
   }

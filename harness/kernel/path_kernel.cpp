@@ -103,13 +103,18 @@ class PathKernel final : public RadianceKernel {
     if (leg.sight.world.length() > 0) walker.begin(*leg.memory, state.path_scene, leg.sight.world, leg.sight.local);
   }
 
+  Event<Value> fly(State& state, const Leg& leg, const Value& throughput, Rng& rng, EventBudget& budget,
+                   Counters& counters) const {
+    if (leg.sight.world.length() > 0) return walker_->fly(*leg.memory, state.path_scene, throughput, rng, budget, counters);
+    return {EventKind::escape, 0, uniform(1)};
+  }
+
   Value path(State& state, Rng& rng, EventBudget& budget, Counters& counters) const {
     Value radiance = uniform(0), throughput = uniform(1);
     Leg* leg = &state.camera;
     Real environment_weight = 1;  // of the environment that the leg's end sees
     for (int scatterings = 0;; ++scatterings) {
-      Event<Value> event{EventKind::escape, 0, uniform(1)};
-      if (leg->sight.world.length() > 0) event = walker_->fly(*leg->memory, state.path_scene, throughput, rng, budget, counters);
+      const Event<Value> event = fly(state, *leg, throughput, rng, budget, counters);
       if (!budget.spend()) return radiance;
       throughput *= event.weight;
       if (!is_collision(event.kind)) {
