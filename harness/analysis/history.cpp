@@ -206,8 +206,10 @@ History history_of(std::vector<RunRecord> runs, const std::vector<std::string>& 
   if (history.results.empty()) return history;
   refuse_other_configurations(history.results);
   drop_copies(history);
-  std::stable_sort(history.results.begin(), history.results.end(),
-                   [](const HistoryResult& a, const HistoryResult& b) { return a.date < b.date; });
+  std::stable_sort(history.results.begin(), history.results.end(), [](const HistoryResult& a, const HistoryResult& b) {
+    // A merged result has the date of its first part.
+    return std::pair(a.date, !a.partial) < std::pair(b.date, !b.partial);
+  });
   shorten_dates(history.results);
   const std::size_t count = history.results.size();
   for (std::size_t i = 1; i < count; ++i)

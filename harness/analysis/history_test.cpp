@@ -200,6 +200,18 @@ RunRecord shard(const char* start) {
   });
 }
 
+TEST(History, PutsAMergedResultAfterItsPart) {
+  for (const bool merged_first : {false, true}) {
+    std::vector<RunRecord> runs = {shard(kNew), dated(kNew)};
+    std::vector<std::string> files = {"part", "merged"};
+    if (merged_first) {
+      std::swap(runs[0], runs[1]);
+      std::swap(files[0], files[1]);
+    }
+    EXPECT_EQ(history_of(std::move(runs), files).results.back().file, "merged");
+  }
+}
+
 TEST(History, SaysThatNothingWasComparedWithAShard) {
   const History history = history_of({dated(kOld), shard(kNew)}, {"a", "b"});
   const std::string text = history_text(history, 0);

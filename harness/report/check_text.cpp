@@ -75,7 +75,8 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
                                 filter == run.provenance.end() ? "" : fmt::format(" by --filter {}", filter->second)));
   }
   if (summary.never_started > 0)
-    lines.push_back(fmt::format("{} cells of the configuration were never started", summary.never_started));
+    lines.push_back(fmt::format("{} cells of the configuration {}were never started", summary.never_started,
+                                run.provenance.contains("shard") ? "belong to other shards, or " : ""));
   if (summary.drawn_in_part > 0)
     lines.push_back(
         fmt::format("{} cells are drawn in part: `merge` joins the results of all shards, and `run CONFIG --resume -o RESULTS` "

@@ -227,8 +227,11 @@ std::string fastest_line(const std::vector<Comparison>& all) {
       std::count_if(all.begin(), all.end(), [](const Comparison& one) { return !fastest(one, false).empty(); }));
   if (ranked == 0) return "no tracker is ranked: none was timed, or none reaches 1 %\n\n";
   const std::string unbiased = fastest_counted(all, true);
-  return fmt::format("Fastest to 1 % error, alone or tied, of {} scene{}: {}{}\n\n", ranked, ranked == 1 ? "" : "s",
-                     fastest_counted(all, false), unbiased.empty() ? "" : "; of those that claim to be unbiased: " + unbiased);
+  return fmt::format(
+      "Fastest to 1 % error, alone or tied, of {} scene{}: {}{}\nA rank is 1 plus the number of trackers that are proven "
+      "faster\n\n",
+      ranked, ranked == 1 ? "" : "s", fastest_counted(all, false),
+      unbiased.empty() ? "" : "; of those that claim to be unbiased: " + unbiased);
 }
 
 std::string baseline_line(const Comparison& comparison) {

@@ -42,6 +42,13 @@ bool rests_on_a_false_variance(const TestRecord& test, const VerdictRecord& verd
                      [](const LawRecord& law) { return law.outcome == Outcome::fail && law.name == "variance from below"; });
 }
 
+/// What a test that fails shows where samples lie outside their range: bets on them need not be fair.
+std::string beside_the_range(const TestRecord& test, Real alpha) {
+  if (test.deterministic()) return measured_bias(test);
+  return fmt::format("{}, but no bias is proven: the evidence (log E {:.1f} > {:.1f}) rests on that range", measured_bias(test),
+                     std::max(test.log_e_fail, test.log_e_beyond), -std::log(alpha));
+}
+
 std::string failure(const TestRecord& test, const Proof& proof, Real alpha, const VerdictRecord& verdict) {
   if (test.deterministic())
     return fmt::format("a sample is off by {:.3g}, rounding allows {:.3g}; {}", test.largest_error,
@@ -129,6 +136,8 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
   } else if (verdict.out_of_range > 0) {
     outcome = Outcome::fail;
     verdict.reason = fmt::format("{} samples lie outside the declared range", verdict.out_of_range);
+    if (found.failed)
+      verdict.reason += "; " + place_of(*found.failed, outputs, found.means) + beside_the_range(*found.failed, alpha);
   } else if (found.failed) {
     outcome = Outcome::fail;
     reason(*found.failed, failure(*found.failed, proven(*found.failed, alpha, verdict.alpha_pass), alpha, verdict));
