@@ -127,13 +127,13 @@ TEST(Words, NoBiasIsProvenByAStatedVarianceThatIsRefuted) {
         const std::string broken = fmt::format("law \"{}\" is broken (log E = 50.0)", law);
         const bool rests =
             std::string(law) == "variance from below" && basis != TestBasis::betting && std::string(from) == "analytic";
-        EXPECT_EQ(
-            finding_of(record),
-            "mean 0.49, expected 0.5: -2 %; " +
-                std::string(rests ? "no bias is proven: the evidence (log E 100.0 > 9.2) rests on the stated variance, which "
-                                    "is too small; "
-                                  : "biased, proven (log E 100.0 > 9.2); ") +
-                broken);
+        EXPECT_EQ(finding_of(record),
+                  "mean 0.49, expected 0.5: -2 %" +
+                      std::string(
+                          rests ? ", but no bias is proven: the evidence (log E 100.0 > 9.2) rests on the stated variance, which "
+                                  "is too small; "
+                                : "; biased, proven (log E 100.0 > 9.2); ") +
+                      broken);
         record.verdict->laws[0].log_e = 0;
         decide(*record.verdict);
         EXPECT_EQ(finding_of(record), "mean 0.49, expected 0.5: -2 %; biased, proven (log E 100.0 > 9.2)");

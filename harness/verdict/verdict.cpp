@@ -42,11 +42,15 @@ bool rests_on_a_false_variance(const TestRecord& test, const VerdictRecord& verd
                      [](const LawRecord& law) { return law.outcome == Outcome::fail && law.name == "variance from below"; });
 }
 
-/// What a test that fails shows where samples lie outside their range: bets on them need not be fair.
-std::string beside_the_range(const TestRecord& test, Real alpha) {
+std::string samples_that(std::size_t count, const char* one, const char* many) {
+  return count == 1 ? fmt::format("1 sample {}", one) : fmt::format("{} samples {}", count, many);
+}
+
+/// What a failed test shows where its evidence rests on a claim of the tracker that is false: the bets need not be fair.
+std::string without_proof(const TestRecord& test, Real alpha, const char* claim) {
   if (test.deterministic()) return measured_bias(test);
-  return fmt::format("{}, but no bias is proven: the evidence (log E {:.1f} > {:.1f}) rests on that range", measured_bias(test),
-                     std::max(test.log_e_fail, test.log_e_beyond), -std::log(alpha));
+  return fmt::format("{}, but no bias is proven: the evidence (log E {:.1f} > {:.1f}) rests on {}", measured_bias(test),
+                     std::max(test.log_e_fail, test.log_e_beyond), -std::log(alpha), claim);
 }
 
 std::string failure(const TestRecord& test, const Proof& proof, Real alpha, const VerdictRecord& verdict) {
@@ -57,10 +61,7 @@ std::string failure(const TestRecord& test, const Proof& proof, Real alpha, cons
   if (verdict.against == "difference")
     return fmt::format("the means differ by {:+.3g}, proven (log E {:.1f} > {:.1f})", test.mean_error,
                        std::max(test.log_e_fail, test.log_e_beyond), needed);
-  if (rests_on_a_false_variance(test, verdict))
-    return fmt::format(
-        "{}; no bias is proven: the evidence (log E {:.1f} > {:.1f}) rests on the stated variance, which is too small",
-        measured_bias(test), std::max(test.log_e_fail, test.log_e_beyond), needed);
+  if (rests_on_a_false_variance(test, verdict)) return without_proof(test, alpha, "the stated variance, which is too small");
   if (proof.beyond && !proof.biased)
     return fmt::format("{}; a bias beyond epsilon is proven (log E {:.1f} > {:.1f})", measured_bias(test), test.log_e_beyond,
                        needed);
@@ -132,12 +133,12 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
     verdict.reason = "needs a majorant that bounds the extinction, and the extinction exceeds it";
   } else if (verdict.nonfinite > 0) {
     outcome = Outcome::fail;
-    verdict.reason = fmt::format("{} samples are not finite", verdict.nonfinite);
+    verdict.reason = samples_that(verdict.nonfinite, "is", "are") + " not finite";
   } else if (verdict.out_of_range > 0) {
     outcome = Outcome::fail;
-    verdict.reason = fmt::format("{} samples lie outside the declared range", verdict.out_of_range);
+    verdict.reason = samples_that(verdict.out_of_range, "lies", "lie") + " outside the declared range";
     if (found.failed)
-      verdict.reason += "; " + place_of(*found.failed, outputs, found.means) + beside_the_range(*found.failed, alpha);
+      verdict.reason += "; " + place_of(*found.failed, outputs, found.means) + without_proof(*found.failed, alpha, "that range");
   } else if (found.failed) {
     outcome = Outcome::fail;
     reason(*found.failed, failure(*found.failed, proven(*found.failed, alpha, verdict.alpha_pass), alpha, verdict));
