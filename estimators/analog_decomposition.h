@@ -25,6 +25,7 @@ struct AnalogDecompositionTracking {
   static constexpr bool kOwnFlights = true;
   static constexpr bool kDrawsExponentials = true;
   static constexpr bool kGreyOnly = true;
+  static constexpr bool kLanes = true;
 
   std::string control = "minimum";
   Real factor = 1, value = 0;
@@ -70,43 +71,48 @@ struct AnalogDecompositionTracking {
   }
 
   struct Walk {
-    Real control_path = 0;  ///< distance of the control's collision, infinite where it has none on the ray
-    bool done = false, looked_up = false;
-    EventKind kind = EventKind::collision;  ///< of a walk that is done
+    Distance<Value> control_path;  ///< distance of the control's collision, infinite where it has none on the ray
+    Truth<Value> done = false, looked_up = false;
+    Truth<Value> scatters = false;  ///< of a walk that is done, with a control_albedo
   };
 
-  void init(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
+  void init(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
     flight.start(ray.control);
-    walk = {flight.next(rng) ? flight.position() : kInfinity, false, false, EventKind::collision};
+    const auto collides = flight.next(rng);
+    walk = {select(collides, flight.position(), Distance<Value>(kInfinity)), false, false, false};
     flight.start(ray.residual);
   }
 
-  bool propose(Walk& walk, const RayData&, Flight& flight, auto& rng) const {
-    if (walk.done) return false;
-    const bool inside = flight.next(rng);
-    if (flight.position() <= walk.control_path) return inside;
-    walk.done = true;
-    if (!control_albedo.empty()) walk.kind = rng.uniform() < control_albedo[0] ? EventKind::scatter : EventKind::absorb;
-    return false;
+  auto propose(Walk& walk, const auto&, auto& flight, auto& rng) const {
+    const auto inside = flight.next(rng, !walk.done), overtaken = (walk.control_path < flight.position()) & !walk.done;
+    if (!none(overtaken)) {
+      if (!control_albedo.empty())
+        walk.scatters = walk.scatters | (overtaken & (rng.uniform_where(overtaken) < control_albedo[0]));
+      walk.done = overtaken | walk.done;
+    }
+    return inside & !overtaken;
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    const Real mu = channel(extinction, 0), chosen = rng.uniform() * at.rate();
-    walk.done = walk.looked_up = chosen < mu - ray.control.rate(at.piece());
-    if (control_albedo.empty()) return;
-    const Real scatter = channel(ray.albedo_at(at.position()), 0) * mu - control_albedo[0] * ray.control.rate(at.piece());
-    walk.kind = chosen < scatter ? EventKind::scatter : EventKind::absorb;
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
+    const Distance<Value> mu = channel(extinction, 0), mu_c = rate_of(ray.control, at.piece()),
+                          chosen = rng.uniform() * at.rate();
+    const auto real = chosen < mu - mu_c;
+    walk.done = walk.looked_up = real;
+    if (!control_albedo.empty())
+      walk.scatters = real & (chosen < grey_albedo(ray, at.position()) * mu - control_albedo[0] * mu_c);
   }
 
-  Value result(const Walk& walk, const RayData& ray) const { return ray.value(walk.done ? 0 : 1); }
+  Value result(const Walk& walk, const auto& ray) const {
+    return ray.value(1) * select(walk.done, Distance<Value>(0), Distance<Value>(1));
+  }
 
   bool samples_events(int channels) const { return channels == 1; }
 
   Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
-    return {walk.done ? walk.kind : EventKind::escape, std::min(walk.control_path, at.position()), ray.value(1)};
+    return {decomposed_end(walk, control_albedo), std::min(walk.control_path, at.position()), ray.value(1)};
   }
 
-  int real_collisions(const Walk& walk, const RayData&) const { return walk.looked_up; }
+  auto real_collisions(const Walk& walk, const auto&) const { return walk.looked_up; }
 
   /// Where the rate is violated every residual collision is accepted: the walk sees mu_c + min(mu - mu_c, mubr).
   Theory theory(const RayData& ray, const RayProfile& smooth, int c, Quantity) const {

@@ -17,6 +17,18 @@ inline void expect_control_albedo(const MatterBounds& medium, const std::vector<
                          "the control that scatters");
 }
 
+/// How a walk of decomposition tracking ended.  Without a control_albedo the scene's albedo chooses.
+EventKind decomposed_end(const auto& walk, const std::vector<Real>& control_albedo) {
+  if (!walk.done) return EventKind::escape;
+  if (control_albedo.empty()) return EventKind::collision;
+  return walk.scatters ? EventKind::scatter : EventKind::absorb;
+}
+
+/// mu_s / mu of a grey medium at a distance, or at those of many walks.
+auto grey_albedo(const auto& ray, const auto& t) {
+  return one_by_one(t, [&](Real distance) { return channel(ray.albedo_at(distance), 0); });
+}
+
 /// The control extinction mu_c(t) of residual tracking along a ray, with tau_c in closed form and the rate that goes with it.
 ///
 ///   minimum, average, middle, maximum   of the segment's bounds (one segment: of the medium; a grid: of each super-voxel)

@@ -29,6 +29,7 @@ class ForcedRng {
     const Real drawn = rng_.uniform();
     return left_-- == 0 ? forced_ : drawn;
   }
+  Real uniform_where(bool drawn) { return drawn ? uniform() : 0; }
   Real exponential() { return negative_logarithm(1 - uniform()); }
   std::uint64_t draws() const { return rng_.draws(); }
   std::uint64_t sample() const { return rng_.sample(); }

@@ -17,6 +17,7 @@ struct PublishedDecompositionTracking : AnalogDecompositionTracking<Value> {
       "decomposition tracking as published in a listing: its residual path restarts at null collisions (biased)";
   static constexpr const char* kSource = "Kutz, Habel, Li, Novak 2017, Sec. 4.1, as a set of notes lists it";
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kLanes = false;
 
   Guarantee claim(Quantity) const { return Guarantee::biased; }
 

@@ -15,6 +15,7 @@ struct RatioRoulette {
   static constexpr const char* kSource = "Novak, Selle, Jarosz 2014, Sec. 3; Pharr, Jakob, Humphreys 2023, Sec. 14.2";
   static constexpr SampleRange kRange = SampleRange::unit;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kLanes = true;
 
   Real threshold = 0.05, survival = 0.25;
 
@@ -31,21 +32,23 @@ struct RatioRoulette {
 
   struct Walk {
     Value weight;
-    bool ended = false;
+    Truth<Value> ended = false;
   };
 
-  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const { walk = {ray.value(1), false}; }
+  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(1), false}; }
 
-  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const { return !walk.ended && flight.next(rng); }
+  auto propose(Walk& walk, const auto&, auto& flight, auto& rng) const { return flight.next(rng, !walk.ended); }
 
-  void consume(Walk& walk, const MediumRay<Value>&, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const auto&, const auto& at, const Value& extinction, auto& rng) const {
     walk.weight *= null_ratio(at, extinction);
-    if (!(largest(magnitude(walk.weight)) < threshold)) return;
-    walk.ended = !(rng.uniform() < survival);
-    walk.weight *= walk.ended ? 0 : 1 / survival;
+    const auto small = largest(magnitude(walk.weight)) < threshold;
+    if (none(small)) return;
+    walk.ended = small & !(rng.uniform_where(small) < survival);
+    const Distance<Value> gain = select(walk.ended, Distance<Value>(0), Distance<Value>(1 / survival));
+    walk.weight *= select(small, gain, Distance<Value>(1));
   }
 
-  Value result(const Walk& walk, const MediumRay<Value>&) const { return walk.weight; }
+  Value result(const Walk& walk, const auto&) const { return walk.weight; }
 };
 
 }  // namespace nullmark

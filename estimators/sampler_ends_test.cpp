@@ -46,6 +46,7 @@ void expect_finite(const std::shared_ptr<const Medium>& medium, Real looseness, 
           Forced& source;
           int left = 300;
           Real uniform() { return source.uniform(); }
+          Real uniform_where(bool drawn) { return drawn ? uniform() : 0; }
           Real exponential() { return left-- > 0 ? source.exponential() : 1e9; }
         } rng{forced};
         const auto outcome = walked.walk(rng);

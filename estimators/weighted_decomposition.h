@@ -28,6 +28,7 @@ struct WeightedDecompositionTracking {
   static constexpr bool kOwnFlights = true;
   static constexpr bool kDrawsExponentials = true;
   static constexpr bool kGreyOnly = true;
+  static constexpr bool kLanes = true;
 
   std::string control = "minimum";
   std::vector<Real> controls, control_albedo;
@@ -73,49 +74,56 @@ struct WeightedDecompositionTracking {
   }
 
   struct Walk {
-    Real weight = 1;
-    bool done = false, looked_up = false;
-    EventKind kind = EventKind::collision;  ///< of a walk that is done
+    Distance<Value> weight;
+    Truth<Value> done = false, looked_up = false;
+    Truth<Value> scatters = false;  ///< of a walk that is done, with a control_albedo
   };
 
-  void init(Walk& walk, const RayData& ray, Flight& flight, auto&) const {
-    walk = {1, false, false, EventKind::collision};
+  void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
+    walk = {1, false, false, false};
     flight.start(ray.rate);
   }
 
-  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
-    if (walk.done || !flight.next(rng)) return false;
-    const Real mu_c = ray.control.rate(flight.piece());
-    const Real at = rng.uniform() * flight.rate();
-    if (at >= mu_c && flight.rate() > mu_c) return true;
-    walk.done = true;
-    if (!control_albedo.empty()) walk.kind = at < control_albedo[0] * mu_c ? EventKind::scatter : EventKind::absorb;
-    return false;
+  auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    const auto inside = flight.next(rng, !walk.done);
+    const Distance<Value> mu_c = rate_of(ray.control, flight.piece()), chosen = rng.uniform_where(inside) * flight.rate();
+    const auto residual = inside & !(chosen < mu_c) & (mu_c < flight.rate()), by_control = inside & !residual;
+    if (!none(by_control)) {
+      if (!control_albedo.empty()) walk.scatters = walk.scatters | (by_control & (chosen < control_albedo[0] * mu_c));
+      walk.done = by_control | walk.done;
+    }
+    return residual;
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    if (control_albedo.empty())
-      choose<false>(walk, ray, at, channel(extinction, 0), rng);
-    else
-      choose<true>(walk, ray, at, channel(extinction, 0), rng);
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
+    const Distance<Value> mu = channel(extinction, 0), mu_c = rate_of(ray.control, at.piece());
+    const auto part = parts(ray, mu, at.position(), mu_c, at.rate());
+    const Distance<Value> chosen = rng.uniform() * part.sum, grown = part.sum / (at.rate() - mu_c);
+    const auto scatters = chosen < magnitude(part.scatter), real = chosen < part.residual();
+    const Distance<Value> event = select(scatters, part.scatter, select(real, part.absorb, part.null));
+    walk.weight *= select(event < 0, -grown, grown);
+    walk.done = walk.looked_up = real;
+    walk.scatters = scatters;
   }
 
-  Value result(const Walk& walk, const RayData& ray) const { return ray.value(walk.done ? 0 : walk.weight); }
+  Value result(const Walk& walk, const auto& ray) const {
+    return ray.value(1) * select(walk.done, Distance<Value>(0), walk.weight);
+  }
 
   bool samples_events(int channels) const { return channels == 1; }
 
   Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
-    return {walk.done ? walk.kind : EventKind::escape, at.position(), ray.value(walk.weight)};
+    return {decomposed_end(walk, control_albedo), at.position(), ray.value(walk.weight)};
   }
 
-  int real_collisions(const Walk& walk, const RayData&) const { return walk.looked_up; }
+  auto real_collisions(const Walk& walk, const auto&) const { return walk.looked_up; }
 
   Theory theory(const RayData& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_bends(ray, smooth);
     std::vector<Real> growth, rate, through, death;
     for (const RayProfile::Node& at : profile.nodes(c)) {
       const Real mub = ray.rate.rate(at.piece), mu_c = ray.control.rate(at.piece);
-      const Parts part = parts(ray, at.extinction, at.t, mu_c, mub);
+      const auto part = parts(ray, at.extinction, at.t, mu_c, mub);
       const Real null = std::abs(part.null);
       rate.push_back(mub - mu_c);
       through.push_back(part.sum > 0 ? rate.back() * null / part.sum : 0);
@@ -131,7 +139,7 @@ struct WeightedDecompositionTracking {
     std::vector<Real> growth, collisions;
     for (const RayProfile::Node& at : profile.nodes(c)) {
       const Real mub = ray.rate.rate(at.piece), mu_c = ray.control.rate(at.piece);
-      const Parts part = parts(ray, at.extinction, at.t, mu_c, mub);
+      const auto part = parts(ray, at.extinction, at.t, mu_c, mub);
       const Real grown = mub > mu_c ? part.sum / (mub - mu_c) : 0;
       growth.push_back(grown * std::abs(part.null) - mub);
       collisions.push_back(mu_c + grown * part.residual());
@@ -143,40 +151,24 @@ struct WeightedDecompositionTracking {
 
  private:
   /// What a lookup splits into; the residual of three events stands for that of absorption.
+  template <class Number>
   struct Parts {
-    Real scatter, absorb, null, sum;
+    Number scatter, absorb, null, sum;
 
-    Real residual() const { return std::abs(scatter) + std::abs(absorb); }
+    Number residual() const { return magnitude(scatter) + magnitude(absorb); }
   };
 
-  template <bool kFive>
-  void choose(Walk& walk, const RayData& ray, const Flight& at, Real mu, auto& rng) const {
-    const Real mu_c = ray.control.rate(at.piece());
-    const Parts part = parts<kFive>(ray, mu, at.position(), mu_c, at.rate());
-    const Real chosen = rng.uniform() * part.sum;
-    const bool scattered = kFive && chosen < std::abs(part.scatter);
-    const bool real = chosen < (kFive ? part.residual() : std::abs(part.absorb));
-    const Real grown = part.sum / (at.rate() - mu_c);
-    walk.weight *= (scattered ? part.scatter : real ? part.absorb : part.null) < 0 ? -grown : grown;
-    walk.done = walk.looked_up = real;
-    if (kFive) walk.kind = scattered ? EventKind::scatter : EventKind::absorb;
-  }
-
-  Parts parts(const RayData& ray, Real mu, Real t, Real mu_c, Real mub) const {
-    return control_albedo.empty() ? parts<false>(ray, mu, t, mu_c, mub) : parts<true>(ray, mu, t, mu_c, mub);
-  }
-
   /// Where nothing has changed sign the sum is mub - mu_c itself, so that weights stay 1 to the last bit.
-  template <bool kFive>
-  Parts parts(const RayData& ray, Real mu, Real t, Real mu_c, Real mub) const {
-    Parts part{0, mu - mu_c, mub - mu, 0};
-    if constexpr (kFive) {
-      const Real albedo = channel(ray.albedo_at(t), 0);
+  template <class Number>
+  Parts<Number> parts(const auto& ray, const Number& mu, const Number& t, const Number& mu_c, const Number& mub) const {
+    Parts<Number> part{0, mu - mu_c, mub - mu, 0};
+    if (!control_albedo.empty()) {
+      const Number albedo = grey_albedo(ray, t);
       part.scatter = albedo * mu - control_albedo[0] * mu_c;
       part.absorb = (1 - albedo) * mu - (1 - control_albedo[0]) * mu_c;
     }
-    const bool bounding = (!kFive || part.scatter >= 0) && part.absorb >= 0 && part.null >= 0;
-    part.sum = bounding ? mub - mu_c : (kFive ? part.residual() : std::abs(part.absorb)) + std::abs(part.null);
+    const auto changed = (part.scatter < 0) | (part.absorb < 0) | (part.null < 0);
+    part.sum = select(changed, part.residual() + magnitude(part.null), mub - mu_c);
     return part;
   }
 
@@ -184,12 +176,13 @@ struct WeightedDecompositionTracking {
   RayProfile cut_at_bends(const RayData& ray, const RayProfile& smooth) const {
     const RayProfile profile = cut_at_levels(smooth, ray.rate, {&ray.rate, &ray.control});
     if (control_albedo.empty()) return profile;
-    const auto sign_of = [&](Real Parts::*part) {
+    const auto sign_of = [&](Real Parts<Real>::*part) {
       return [this, &ray, part](Real t, std::size_t piece, Real mu) {
         return parts(ray, mu, t, ray.control.rate(piece), ray.rate.rate(piece)).*part > 0;
       };
     };
-    return cut_at_changes(cut_at_changes(profile, ray.rate, sign_of(&Parts::scatter)), ray.rate, sign_of(&Parts::absorb));
+    return cut_at_changes(cut_at_changes(profile, ray.rate, sign_of(&Parts<Real>::scatter)), ray.rate,
+                          sign_of(&Parts<Real>::absorb));
   }
 };
 

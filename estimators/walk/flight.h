@@ -108,6 +108,9 @@ class Flight {
   Real depth_ = 0, position_ = 0;
 };
 
+/// Rate of a piece, or of each walk's piece in lanes.
+inline Real rate_of(const Rates& rates, std::size_t piece) { return rates.rate(piece); }
+
 /// (mub - mu)/mub where the walk is: the weight of a null collision.  At most 1, 0 where the majorant is tight, negative where it
 /// is violated.  It multiplies by the inverse rate, which the flight knows, because a division takes as long as a random number.
 template <class Value>

@@ -47,6 +47,12 @@ class LaneRates {
   bool rewinds_ = false;
 };
 
+template <class T, std::size_t N>
+Lanes<T, N> rate_of(const Rates& rates, LaneIndex<T, N> piece) {
+  const RatePiece<T>* const pieces = rates.pieces<T>();
+  return rates.size() > 1 ? piece.template gathered<6>(&pieces->rate) : Lanes<T, N>(pieces->rate);
+}
+
 /// Where N walks are.
 template <class T, std::size_t N>
 struct LanePlace {

@@ -52,15 +52,16 @@ class LaneRng {
     return x - logarithm(Pack(1) - fraction());
   }
 
-  /// exponential() where only the lanes of the mask draw; the others' streams stay where they were.
-  Pack exponential(Mask lanes) {
+  /// Only the lanes of the mask draw; the others' streams stay where they were.
+  [[gnu::always_inline]] Pack uniform_where(Mask lanes) {
     const State before = state_;
     draws_ += count(lanes & alive_);
-    const Pack e = negative_logarithm(Pack(1) - fraction());
+    const Pack u = fraction();
     for (std::size_t w = 0; w < kWords; ++w)
       state_[w] = hn::IfThenElse(hn::RebindMask(Tag(), lanes.mask()), state_[w], before[w]);
-    return e;
+    return u;
   }
+  Pack exponential(Mask lanes) { return negative_logarithm(Pack(1) - uniform_where(lanes)); }
 
   /// Takes back the count of a draw by lanes whose walk had ended: they leave with it.
   void forget(Mask lanes) { draws_ -= count(lanes & alive_); }
@@ -112,14 +113,11 @@ class LaneRng {
 template <class T, std::size_t N>
 typename LaneRng<T, N>::State LaneRng<T, N>::seeded(const SampleAddress& first) {
   using namespace hn;
-  // Philox4x32-10 (media/base/philox.h), each of its words in the low half of a 64-bit lane: one half of the samples after the
-  // other.
+  // Philox4x32-10 (media/base/philox.h), each of its words in the low half of a 64-bit lane.
   constexpr std::size_t kWide = N < kNativeLanes<double> ? N : kNativeLanes<double>;
   const FixedTag<std::uint64_t, kWide> wide;
-  alignas(HWY_MAX_BYTES) std::array<std::array<Word, N>, kWords> words;
-  for (std::size_t done = 0; done < N; done += kWide) {
-    const auto sample = Add(Iota(wide, 0), Set(wide, first.sample + done));
-    const auto low = Set(wide, 0xffffffff);
+  const auto block = [&](std::uint64_t from) {
+    const auto sample = Add(Iota(wide, 0), Set(wide, from)), low = Set(wide, 0xffffffff);
     auto c0 = And(sample, low), c1 = ShiftRight<32>(sample), c2 = Set(wide, first.ray), c3 = Zero(wide);
     std::uint32_t k0 = static_cast<std::uint32_t>(first.key), k1 = static_cast<std::uint32_t>(first.key >> 32);
     const RepartitionToNarrow<decltype(wide)> narrow;
@@ -131,23 +129,21 @@ typename LaneRng<T, N>::State LaneRng<T, N>::seeded(const SampleAddress& first) 
       c2 = Xor(Xor(ShiftRight<32>(a), c3), Set(wide, k1));
       c3 = And(a, low);
     }
-    std::uint64_t c[4][kWide];
-    StoreU(c0, wide, c[0]);
-    StoreU(c1, wide, c[1]);
-    StoreU(c2, wide, c[2]);
-    StoreU(c3, wide, c[3]);
-    for (std::size_t k = 0; k < kWide; ++k) {
-      if constexpr (kDouble) {
-        words[0][done + k] = c[0][k] | c[1][k] << 32;
-        words[1][done + k] = c[2][k] | c[3][k] << 32;
-      } else {
-        for (std::size_t w = 0; w < 4; ++w) words[w][done + k] = static_cast<std::uint32_t>(c[w][k]);
-      }
-    }
-  }
+    return std::array{c0, c1, c2, c3};
+  };
   State state;
+  const auto words = block(first.sample);
+  if constexpr (kDouble) {
+    for (std::size_t w = 0; w < kWords; ++w) state[w] = Or(words[2 * w], ShiftLeft<32>(words[2 * w + 1]));
+  } else if constexpr (N == kWide) {
+    for (std::size_t w = 0; w < kWords; ++w) state[w] = TruncateTo(Tag(), words[w]);
+  } else {
+    static_assert(N == 2 * kWide);
+    const auto others = block(first.sample + kWide);
+    for (std::size_t w = 0; w < kWords; ++w) state[w] = ConcatEven(Tag(), BitCast(Tag(), others[w]), BitCast(Tag(), words[w]));
+  }
   auto any = Zero(Tag());
-  for (std::size_t w = 0; w < kWords; ++w) any = Or(any, state[w] = Load(Tag(), words[w].data()));
+  for (std::size_t w = 0; w < kWords; ++w) any = Or(any, state[w]);
   // The one state that the generator cannot leave.
   const std::size_t last = kDouble ? 1 : 3;
   state[last] = IfThenElse(Eq(any, Zero(Tag())), Set(Tag(), 1), state[last]);

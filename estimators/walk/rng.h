@@ -48,6 +48,9 @@ class Rng {
   /// The same; lanes count such draws for the walks that go on alone.
   Real uniform(bool) { return uniform(); }
 
+  /// The same where it is drawn; 0 and no draw elsewhere.
+  Real uniform_where(bool drawn) { return drawn ? uniform() : 0; }
+
   /// Unit exponential -log(1 - u); 1 - u is exact, so u = 0 gives 0 and u = 1 - 2^-53 gives 36.7.
   Real exponential() {
     if (ready_ < 0) return negative_logarithm(1 - uniform());

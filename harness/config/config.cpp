@@ -77,12 +77,13 @@ DraftPlan read_file(const ConfigSource& source, std::optional<std::uint64_t> see
   if (json.is_object() && json.contains("cells"))
     throw InputError(source.file + ": is a results file; nullmark check, compare and report read it");
   top.expect_object();
+  constexpr const char* kFromVersion1 =
+      "version 1 is no longer read; rename \"gate\" to \"verdict\", and \"verdict\" at the top to \"error_rates\"";
   if (json.contains("$schema") && json["$schema"] == "nullmark/config/1")
-    top["$schema"].fail(fmt::format(
-        "version 1 is no longer read; replace this key by \"{}\": \"{}\", rename \"gate\" to \"verdict\", and \"verdict\" "
-        "at the top to \"error_rates\"",
-        kVersionKey, kConfigVersion));
+    top["$schema"].fail(fmt::format("{}; and replace this key by \"{}\": \"{}\"", kFromVersion1, kVersionKey, kConfigVersion));
   if (!json.contains(kVersionKey)) top.fail(fmt::format("expected the key \"{}\": \"{}\"", kVersionKey, kConfigVersion));
+  if (top[kVersionKey].string() == "config/1")
+    top[kVersionKey].fail(fmt::format("{}; and write \"{}\"", kFromVersion1, kConfigVersion));
   if (top[kVersionKey].string() != kConfigVersion) top[kVersionKey].expected(fmt::format("\"{}\"", kConfigVersion));
   refuse_renamed(top, "verdict", "error_rates");
   top.expect_keys(

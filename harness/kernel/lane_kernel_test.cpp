@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "estimators/analog_decomposition.h"
 #include "estimators/delta.h"
 #include "estimators/jackknife.h"
 #include "estimators/majorant_guided_ratio.h"
@@ -15,11 +16,13 @@
 #include "estimators/p_series_ratio.h"
 #include "estimators/published_next_flight_ratio.h"
 #include "estimators/ratio.h"
+#include "estimators/ratio_roulette.h"
 #include "estimators/ray_marching.h"
 #include "estimators/residual_delta.h"
 #include "estimators/residual_ratio.h"
 #include "estimators/telescoping.h"
 #include "estimators/telescoping_difference.h"
+#include "estimators/weighted_decomposition.h"
 #include "estimators/weighted_delta.h"
 #include "harness/kernel/estimator_template.h"
 #include "harness/kernel/lane_kernel_test.h"
@@ -84,6 +87,23 @@ TEST(Lanes, ResidualRatioTrackingIsTheSameAtEveryWidth) {
     estimator.choice.kind = "given";
     estimator.choice.value = 2000;
   });
+}
+TEST(Lanes, RouletteIsTheSameAtEveryWidth) {
+  for (const Real threshold : {0.05, 0.25})
+    compare_widths<RatioRoulette>([&](auto& estimator) { estimator.threshold = threshold; });
+}
+TEST(Lanes, DecompositionTrackingIsTheSameAtEveryWidth) {
+  for (const bool of_albedo : {false, true}) {
+    compare_widths<AnalogDecompositionTracking>([&](auto& estimator) {
+      estimator.factor = 0.8;
+      if (of_albedo) estimator.control_albedo = {0.4};
+    });
+    for (const char* control : {"minimum", "average", "maximum"})
+      compare_widths<WeightedDecompositionTracking>([&](auto& estimator) {
+        estimator.control = control;
+        if (of_albedo) estimator.control_albedo = {0.4};
+      });
+  }
 }
 TEST(Lanes, RayMarchingIsTheSameAtEveryWidth) {
   for (const char* offset : {"left", "midpoint", "right", "uniform", "stratified"})

@@ -132,16 +132,17 @@ class TestPlanner {
   /// What of a range would help here.
   void advise(SampleRange range, bool bounding) {
     if (cell_.quantity == Quantity::optical_depth)
-      advice_ = "state the variance of the samples (theory)";
+      advice_ = "the tracker could state the variance of its samples (theory)";
     else if (!bounding)
       advice_ =
-          "a range of the samples holds only under a majorant that is known to bound the extinction: give one, or state the "
-          "variance of "
-          "the samples (theory)";
+          "a range of the samples holds only under a majorant that is known to bound the extinction: give one, or the tracker "
+          "could state the variance of its samples (theory)";
     else if (range == SampleRange::non_negative)
-      advice_ = "state a range that is bounded above (kRange; in other languages: range), the variance of the samples (theory)";
+      advice_ =
+          "the tracker could state a range that is bounded above (kRange; in other languages: range), the variance of its "
+          "samples (theory)";
     else
-      advice_ = "state a range of the samples (kRange; in other languages: range), their variance (theory)";
+      advice_ = "the tracker could state a range of its samples (kRange; in other languages: range), their variance (theory)";
     advice_ += ", or the guarantee \"exact\"";
   }
 
@@ -252,6 +253,13 @@ class TestPlanner {
     return pilot_ && pilot_->taken > 0 ? digits(with_a_pilot(judged)) + " in all" : digits(judged);
   }
 
+  /// The key of "verdict" that limits the samples; of samples that were handed in there is none.
+  std::string to_allow_more() const {
+    if (pilot_ && pilot_->taken > 0) return "";
+    const bool by_lookups = plan_.affordable < std::max(cell_.samples_per_ray, cell_.verdict.max_samples_per_ray);
+    return fmt::format("; raise {}", by_lookups ? "max_lookups_per_ray" : "max_samples_per_ray");
+  }
+
   /// What the test of a mean asks of the cell.
   void demand(const MeanTest& test, const Pool& pool) {
     if (test.reference_error > 0.25 * test.epsilon)
@@ -265,10 +273,11 @@ class TestPlanner {
     const Real mean = std::max(std::abs(pool.size), least_of(cell_.precision));
     const std::string epsilon = fmt::format("a PASS at epsilon {:.2g}{}", test.epsilon / mean,
                                             test.group == MeanTest::kAllRays ? "" : " of the mean of a group of rays");
-    needs_ = fmt::format("not decidable at {}; {} needs {} (relative variance {:.2g})", counted(plan_.affordable), epsilon,
-                         needed_in_all(test.planned), test.variance / (mean * mean));
-    tight_ = fmt::format("perhaps not decidable at {}; {} needs {} with a chance of .95, and {} to be sure",
-                         counted(plan_.allowance), epsilon, needed_in_all(test.planned), needed_in_all(test.sure));
+    needs_ = fmt::format("not decidable at {}; {} needs {} (relative variance {:.2g}){}", counted(plan_.affordable), epsilon,
+                         needed_in_all(test.planned), test.variance / (mean * mean), to_allow_more());
+    tight_ =
+        fmt::format("perhaps not decidable at {}; {} needs {} with a chance of .95, and {} to be sure{}",
+                    counted(plan_.allowance), epsilon, needed_in_all(test.planned), needed_in_all(test.sure), to_allow_more());
   }
 
   /// Whether the samples allowed decide the mean, and what is missing where they do not.

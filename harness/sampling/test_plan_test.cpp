@@ -26,12 +26,12 @@ std::string advice(SampleRange range, bool bounding, Quantity quantity = Quantit
 
 TEST(TestPlan, AdvisesOnlyWhatWouldHelp) {
   constexpr const char *kBound = "a majorant that is known to bound",
-                       *kRange = "state a range of the samples (kRange; in other languages: range)";
+                       *kRange = "the tracker could state a range of its samples (kRange; in other languages: range)";
   EXPECT_EQ(advice(SampleRange::unit, true), "");
   EXPECT_EQ(advice(SampleRange::any_sign, true).rfind(kRange, 0), 0u);
-  EXPECT_EQ(
-      advice(SampleRange::non_negative, true).rfind("state a range that is bounded above (kRange; in other languages: range)", 0),
-      0u);
+  EXPECT_EQ(advice(SampleRange::non_negative, true)
+                .rfind("the tracker could state a range that is bounded above (kRange; in other languages: range)", 0),
+            0u);
   // A range of 0 and 1 holds whatever the majorant is; others do not.
   EXPECT_EQ(advice(SampleRange::binary, false), "");
   for (const SampleRange range : {SampleRange::unit, SampleRange::non_negative, SampleRange::any_sign}) {
