@@ -253,13 +253,6 @@ class TestPlanner {
     return pilot_ && pilot_->taken > 0 ? digits(with_a_pilot(judged)) + " in all" : digits(judged);
   }
 
-  /// The key of "verdict" that limits the samples; of samples that were handed in there is none.
-  std::string to_allow_more() const {
-    if (pilot_ && pilot_->taken > 0) return "";
-    const bool by_lookups = plan_.affordable < std::max(cell_.samples_per_ray, cell_.verdict.max_samples_per_ray);
-    return fmt::format("; raise {}", by_lookups ? "max_lookups_per_ray" : "max_samples_per_ray");
-  }
-
   /// What the test of a mean asks of the cell.
   void demand(const MeanTest& test, const Pool& pool) {
     if (test.reference_error > 0.25 * test.epsilon)
@@ -273,11 +266,10 @@ class TestPlanner {
     const Real mean = std::max(std::abs(pool.size), least_of(cell_.precision));
     const std::string epsilon = fmt::format("a PASS at epsilon {:.2g}{}", test.epsilon / mean,
                                             test.group == MeanTest::kAllRays ? "" : " of the mean of a group of rays");
-    needs_ = fmt::format("not decidable at {}; {} needs {} (relative variance {:.2g}){}", counted(plan_.affordable), epsilon,
-                         needed_in_all(test.planned), test.variance / (mean * mean), to_allow_more());
-    tight_ =
-        fmt::format("perhaps not decidable at {}; {} needs {} with a chance of .95, and {} to be sure{}",
-                    counted(plan_.allowance), epsilon, needed_in_all(test.planned), needed_in_all(test.sure), to_allow_more());
+    needs_ = fmt::format("not decidable at {}; {} needs {} (relative variance {:.2g})", counted(plan_.affordable), epsilon,
+                         needed_in_all(test.planned), test.variance / (mean * mean));
+    tight_ = fmt::format("perhaps not decidable at {}; {} needs {} with a chance of .95, and {} to be sure",
+                         counted(plan_.allowance), epsilon, needed_in_all(test.planned), needed_in_all(test.sure));
   }
 
   /// Whether the samples allowed decide the mean, and what is missing where they do not.
