@@ -43,13 +43,13 @@ class LaneRng {
   /// Unit exponentials -log(1 - u): at most 36.7 (16.6 in float).
   [[gnu::always_inline]] Pack exponential() {
     draws_ += living_;
-    return negative_logarithm(Pack(1) - fraction());
+    return negative_logarithm(rest());
   }
 
   /// x + exponential(), without turning the logarithm's sign on the way.
   [[gnu::always_inline]] Pack exponential_beyond(Pack x) {
     draws_ += living_;
-    return x - logarithm(Pack(1) - fraction());
+    return x - logarithm(rest());
   }
 
   /// Only the lanes of the mask draw; the others' streams stay where they were.
@@ -77,20 +77,56 @@ class LaneRng {
   }
 
  private:
-  /// The next u; 1 - u is exact as well.
+  /// u is the upper 53 (24) bits of an output, in units of kUnit.
+  static constexpr int kBelow = kDouble ? 11 : 8;
+  static constexpr T kUnit = kDouble ? T{0x1p-53} : T{0x1p-24};
+  /// Before AVX-512 x86 has no instruction that makes doubles of 64-bit integers.
+  static constexpr bool kInHalves = kDouble && HWY_ARCH_X86 && HWY_TARGET > HWY_AVX3;
+
+  /// The next u.
   [[gnu::always_inline]] Pack fraction() {
+    if constexpr (kInHalves) {
+      const auto [high, low] = halves(output());
+      return high - Pack(0x1p31 + 0.5) + low;
+    } else {
+      return Pack(whole(output())) * Pack(kUnit);
+    }
+  }
+
+  /// 1 - u for the next u, which is exact.
+  [[gnu::always_inline]] Pack rest() {
+    if constexpr (kInHalves) {
+      const auto [high, low] = halves(output());
+      return Pack(0x1p31 + 1.5) - high - low;
+    } else {
+      return hn::NegMulAdd(whole(output()), Pack(kUnit).vector(), Pack(1).vector());
+    }
+  }
+
+  [[gnu::always_inline]] static typename Pack::Vector whole(Vector output) {
+    return hn::ConvertTo(typename Pack::Tag(), hn::BitCast(hn::RebindToSigned<Tag>(), hn::ShiftRight<kBelow>(output)));
+  }
+
+  /// u of an output as 2^31 plus its upper 21 bits and 1/2 plus its lower 32 bits: the bits become those of two doubles.
+  [[gnu::always_inline]] static std::array<Pack, 2> halves(Vector output) {
+    using namespace hn;
+    const RepartitionToNarrow<Tag> words;
+    return {BitCast(typename Pack::Tag(), Or(ShiftRight<43>(output), BitCast(Tag(), Set(typename Pack::Tag(), 0x1p31)))),
+            BitCast(typename Pack::Tag(), OddEven(Set(words, 0x3FE00000), BitCast(words, ShiftRight<kBelow>(output))))};
+  }
+
+  /// The generator's next.
+  [[gnu::always_inline]] Vector output() {
     using namespace hn;
     const auto rotated = []<int k>(Vector v, std::integral_constant<int, k>) {
       return RotateRight<static_cast<int>(sizeof(Word)) * 8 - k>(v);
     };
-    const RebindToSigned<Tag> integers;
-    const FixedTag<T, N> reals;
     if constexpr (kDouble) {
       const Vector a = state_[0], b = Xor(state_[1], a);
       const Vector output = Add(rotated(Add(a, state_[1]), std::integral_constant<int, 17>()), a);
       state_[0] = Xor(Xor(rotated(a, std::integral_constant<int, 49>()), b), ShiftLeft<21>(b));
       state_[1] = rotated(b, std::integral_constant<int, 28>());
-      return Pack(ConvertTo(reals, BitCast(integers, ShiftRight<11>(output)))) * Pack(0x1p-53);
+      return output;
     } else {
       const Vector output = Add(rotated(Add(state_[0], state_[3]), std::integral_constant<int, 7>()), state_[0]);
       const Vector t = ShiftLeft<9>(state_[1]);
@@ -100,7 +136,7 @@ class LaneRng {
       state_[0] = Xor(state_[0], state_[3]);
       state_[2] = Xor(state_[2], t);
       state_[3] = rotated(state_[3], std::integral_constant<int, 11>());
-      return Pack(ConvertTo(reals, BitCast(integers, ShiftRight<8>(output)))) * Pack(0x1p-24);
+      return output;
     }
   }
 
