@@ -86,24 +86,20 @@ struct WeightedDecompositionTracking {
 
   auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
     const auto inside = flight.next(rng, !walk.done);
+    if (none(inside)) return inside;
     const Distance<Value> mu_c = rate_of(ray.control, flight.piece()), chosen = rng.uniform_where(inside) * flight.rate();
-    const auto residual = inside & !(chosen < mu_c) & (mu_c < flight.rate()), by_control = inside & !residual;
-    if (!none(by_control)) {
-      if (!control_albedo.empty()) walk.scatters = walk.scatters | (by_control & (chosen < control_albedo[0] * mu_c));
-      walk.done = by_control | walk.done;
-    }
+    const decltype(inside) residual = inside & !(chosen < mu_c) & (mu_c < flight.rate()), by_control = inside & !residual;
+    if (none(by_control)) return residual;
+    if (!control_albedo.empty()) walk.scatters = walk.scatters | (by_control & (chosen < control_albedo[0] * mu_c));
+    walk.done = by_control | walk.done;
     return residual;
   }
 
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
-    const Distance<Value> mu = channel(extinction, 0), mu_c = rate_of(ray.control, at.piece());
-    const auto part = parts(ray, mu, at.position(), mu_c, at.rate());
-    const Distance<Value> chosen = rng.uniform() * part.sum, grown = part.sum / (at.rate() - mu_c);
-    const auto scatters = chosen < magnitude(part.scatter), real = chosen < part.residual();
-    const Distance<Value> event = select(scatters, part.scatter, select(real, part.absorb, part.null));
-    walk.weight *= select(event < 0, -grown, grown);
-    walk.done = walk.looked_up = real;
-    walk.scatters = scatters;
+    if (control_albedo.empty())
+      choose<false>(walk, ray, at, extinction, rng);
+    else
+      choose<true>(walk, ray, at, extinction, rng);
   }
 
   Value result(const Walk& walk, const auto& ray) const {
@@ -142,7 +138,7 @@ struct WeightedDecompositionTracking {
       const auto part = parts(ray, at.extinction, at.t, mu_c, mub);
       const Real grown = mub > mu_c ? part.sum / (mub - mu_c) : 0;
       growth.push_back(grown * std::abs(part.null) - mub);
-      collisions.push_back(mu_c + grown * part.residual());
+      collisions.push_back(mu_c + grown * part.residual);
     }
     Theory theory = this->theory(ray, smooth, c, Quantity::free_path);
     theory.variance = weight_variance(profile, c, growth, collisions);
@@ -153,23 +149,45 @@ struct WeightedDecompositionTracking {
   /// What a lookup splits into; the residual of three events stands for that of absorption.
   template <class Number>
   struct Parts {
-    Number scatter, absorb, null, sum;
-
-    Number residual() const { return magnitude(scatter) + magnitude(absorb); }
+    Number scatter, absorb, null;
+    Number residual, sum;  ///< |r_s| + |r_a|, and with |mu_n|
   };
 
+  template <bool five>
+  void choose(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
+    const Distance<Value> mu = channel(extinction, 0), mu_c = rate_of(ray.control, at.piece());
+    const auto part = parts<five>(ray, mu, at.position(), mu_c, at.rate());
+    const Distance<Value> chosen = rng.uniform() * part.sum, grown = part.sum / (at.rate() - mu_c);
+    const auto real = chosen < part.residual;
+    Distance<Value> event = select(real, part.absorb, part.null);
+    if constexpr (five) {
+      const auto scatters = chosen < magnitude(part.scatter);
+      event = select(scatters, part.scatter, event);
+      walk.scatters = scatters;
+    }
+    walk.weight *= select(event < 0, -grown, grown);
+    walk.done = walk.looked_up = real;
+  }
+
   /// Where nothing has changed sign the sum is mub - mu_c itself, so that weights stay 1 to the last bit.
-  template <class Number>
+  template <bool five, class Number>
   Parts<Number> parts(const auto& ray, const Number& mu, const Number& t, const Number& mu_c, const Number& mub) const {
-    Parts<Number> part{0, mu - mu_c, mub - mu, 0};
-    if (!control_albedo.empty()) {
+    Parts<Number> part{0, mu - mu_c, mub - mu, 0, 0};
+    if constexpr (five) {
       const Number albedo = grey_albedo(ray, t);
       part.scatter = albedo * mu - control_albedo[0] * mu_c;
       part.absorb = (1 - albedo) * mu - (1 - control_albedo[0]) * mu_c;
+      part.residual = magnitude(part.scatter) + magnitude(part.absorb);
+    } else {
+      part.residual = magnitude(part.absorb);
     }
     const auto changed = (part.scatter < 0) | (part.absorb < 0) | (part.null < 0);
-    part.sum = select(changed, part.residual() + magnitude(part.null), mub - mu_c);
+    part.sum = select(changed, part.residual + magnitude(part.null), mub - mu_c);
     return part;
+  }
+
+  Parts<Real> parts(const RayData& ray, Real mu, Real t, Real mu_c, Real mub) const {
+    return control_albedo.empty() ? parts<false>(ray, mu, t, mu_c, mub) : parts<true>(ray, mu, t, mu_c, mub);
   }
 
   /// Theories bend where a residual or the null collisions change sign.
