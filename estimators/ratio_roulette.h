@@ -25,7 +25,9 @@ struct RatioRoulette {
   }
 
   void check(const MatterBounds&) const {
-    if (survival < threshold) throw ParameterError("survival", "survival is below the threshold; weights would exceed 1");
+    if (survival < threshold)
+      throw ParameterError("survival", "found " + std::to_string(survival) + ", below the threshold " +
+                                           std::to_string(threshold) + ": weights would exceed 1");
   }
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }

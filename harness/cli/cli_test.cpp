@@ -269,6 +269,9 @@ TEST_F(Cli, ListsSchemasAndVersion) {
     const bool in_float = source->kernel(1, Precision::float32) != nullptr;
     EXPECT_EQ(entry["lanes"].get<bool>(), in_float) << name;
     EXPECT_EQ(entry["precisions"].size(), in_float ? 2u : 1u) << name;
+    if (name == "ratio" || name == "analog_decomposition") {
+      EXPECT_EQ(entry["grey_only"].get<bool>(), name != "ratio") << name;
+    }
   }
   for (const char* which : {"config", "results"}) {
     EXPECT_EQ(run(std::string("schema ") + which), 0);

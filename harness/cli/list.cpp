@@ -41,6 +41,7 @@ void add_traits(const std::string& name, Json& json) {
   json["claims"] = std::move(claims);
   json["range"] = to_string(entry.range);
   json["needs_bound"] = entry.needs_bound;
+  json["grey_only"] = source->kernel(3) == nullptr;
   json["lanes"] = entry.in_lanes;
   json["precisions"] = Json::array({to_string(Precision::float64)});
   if (entry.in_lanes) json["precisions"].push_back(to_string(Precision::float32));
@@ -82,7 +83,8 @@ void print_text(const Json& list) {
       std::string claims;
       for (const auto& [quantity, claim] : entry["claims"].items())
         claims += fmt::format("{}{}: {}", claims.empty() ? "" : ", ", quantity, plain(claim));
-      tell_line(fmt::format("    {}; range of samples: {}{}{}\n", claims, plain(entry["range"]),
+      tell_line(fmt::format("    {}; range of samples: {}{}{}{}\n", claims, plain(entry["range"]),
+                            entry["grey_only"].get<bool>() ? "; takes grey media only" : "",
                             entry["needs_bound"].get<bool>() ? "; needs a majorant that bounds the extinction" : "",
                             entry["lanes"].get<bool>() ? "; runs in lanes, in double and in float" : ""));
     }

@@ -84,13 +84,15 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
                     summary.drawn_in_part));
   if (summary.altered > 0) lines.push_back(fmt::format("{} verdicts in the file are not what its figures say", summary.altered));
   lines.insert(lines.end(), summary.disagreements.begin(), summary.disagreements.end());
-  const auto wants_samples = [](const CellRecord& record) {
-    return kind_of(record) == Kind::expected_open && record.verdict->planned > record.verdict->affordable;
-  };
-  if (std::any_of(run.cells.begin(), run.cells.end(), wants_samples))
+  std::uint64_t wanted = 0;
+  for (const CellRecord& record : run.cells)
+    if (kind_of(record) == Kind::expected_open && record.verdict->planned > record.verdict->affordable)
+      wanted = std::max(wanted, record.verdict->planned);
+  if (wanted > 0)
     lines.push_back(
-        "cells that are INCONCLUSIVE as planned may draw more samples: raise \"max_samples_per_ray\" or "
-        "\"max_lookups_per_ray\" of \"verdict\"");
+        fmt::format("cells that are INCONCLUSIVE as planned need up to {} samples a ray: raise \"max_samples_per_ray\" or "
+                    "\"max_lookups_per_ray\" in \"verdict\" of their experiments, and run again",
+                    wanted));
   lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());
   if (!summary.nothing_proven.empty()) lines.push_back(summary.nothing_proven);
   for (const ClaimFinding& one : summary.findings)

@@ -35,6 +35,10 @@ std::string law_text(const LawRecord& law) {
   std::string text = fmt::format("law \"{}\" is broken (log E = {:.1f})", law.name, law.log_e);
   if (law.name == "replay")
     text += ": samples differ when they are drawn again; a sample may depend on its ray and its stream alone";
+  if (law.name == "independence")
+    text +=
+        ": flights, samples or rays depend on each other; a tracker that takes several flights a sample, or ends one without a "
+        "lookup, states flies_once() false";
   return text;
 }
 

@@ -109,7 +109,9 @@ TEST(Words, AFindingIsWhatAPassProvesAndWhyOthersAreNone) {
   record.verdict->laws = {{"independence", 100, 100, Outcome::none}};
   decide(*record.verdict);
   EXPECT_EQ(finding_of(record),
-            "law \"independence\" is broken (log E = 100.0); undecided after 1000 samples a ray; 800 were planned");
+            "law \"independence\" is broken (log E = 100.0): flights, samples or rays depend on each other; a tracker that takes "
+            "several flights a sample, or ends one without a lookup, states flies_once() false; undecided after 1000 samples a "
+            "ray; 800 were planned");
 }
 
 /// Catoni's bets take the variance as given, and bets against a bias are his only where samples have no bound above: there the
