@@ -117,7 +117,7 @@ TEST(Words, AFindingIsWhatAPassProvesAndWhyOthersAreNone) {
 /// Catoni's bets take the variance as given, and bets against a bias are his only where samples have no bound above: there the
 /// law is "variance from below".  A pilot's variance is not stated.
 TEST(Words, NoBiasIsProvenByAStatedVarianceThatIsRefuted) {
-  for (const char* law : {"variance", "variance from below", "independence"})
+  for (const char* law : {"variance", "variance from below", "chi square"})
     for (const TestBasis basis : {TestBasis::catoni, TestBasis::both, TestBasis::betting})
       for (const char* from : {"analytic", "pilot"}) {
         CellRecord record = failed();
