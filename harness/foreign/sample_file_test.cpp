@@ -88,6 +88,7 @@ TEST_F(SampleFiles, RightSamplesPassAndASlipFails) {
   write_npy("few.npy", {64, rays}, values);
   EXPECT_EQ(run("judge p few.npy"), 77) << read("out") << read("err");
   EXPECT_NE(read("out").find("undecided: hand in more samples; state their --range"), std::string::npos) << read("out");
+  EXPECT_EQ(read("out").find("max_samples_per_ray"), std::string::npos) << read("out");
   values.back() = 1.5;
   write_npy("beyond.npy", {64, rays}, values);
   expect_refused("p beyond.npy --range unit", "is 1.5; expected the stated range, unit");

@@ -84,9 +84,11 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
                     summary.drawn_in_part));
   if (summary.altered > 0) lines.push_back(fmt::format("{} verdicts in the file are not what its figures say", summary.altered));
   lines.insert(lines.end(), summary.disagreements.begin(), summary.disagreements.end());
+  // Of samples that were handed in, no key allows more.
   std::uint64_t wanted = 0;
   for (const CellRecord& record : run.cells)
-    if (kind_of(record) == Kind::expected_open && record.verdict->planned > record.verdict->affordable)
+    if (!record.tracker.unrepeatable && kind_of(record) == Kind::expected_open &&
+        record.verdict->planned > record.verdict->affordable)
       wanted = std::max(wanted, record.verdict->planned);
   if (wanted > 0)
     lines.push_back(

@@ -37,7 +37,7 @@ std::string law_text(const LawRecord& law) {
     text += ": samples differ when they are drawn again; a sample may depend on its ray and its stream alone";
   if (law.name == "independence")
     text +=
-        ": flights, samples or rays depend on each other; a tracker that takes several flights a sample, or ends one without a "
+        ": flights, samples or rays depend on each other; a tracker that takes several flights a sample, or collides without a "
         "lookup, states flies_once() false";
   return text;
 }
