@@ -3,15 +3,17 @@
 import json
 import re
 import shutil
+import time
 import unittest
 
 from selenium import webdriver
+from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
-from selenium.webdriver.support.ui import WebDriverWait
 
 from .views import SIZES, THEMES
 
 PATIENCE = 120
+SECONDS_TO_A_FRAME = 5
 
 # Of every plot: where it is, its kinds of traces, how many finite points, and the names in its legend.
 PLOTS = """
@@ -35,6 +37,10 @@ ROWS = """
   });"""
 
 
+class NoFrames(Exception):
+    """The browser has stopped drawing: whatever the page asks for is never shown."""
+
+
 def open_browser():
     options = webdriver.ChromeOptions()
     for flag in ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]:
@@ -52,9 +58,13 @@ class PageTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
+        cls.messages, cls.requests = [], []
+        cls.start()
+
+    @classmethod
+    def start(cls):
         cls.browser = open_browser()
         cls.browser.execute_cdp_cmd("Network.enable", {})
-        cls.messages, cls.requests = [], []
         width, height = cls.size
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         cls.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
@@ -78,13 +88,38 @@ class PageTest(unittest.TestCase):
 
     @classmethod
     def wait(cls, condition):
-        WebDriverWait(cls.browser, PATIENCE, 0.05).until(lambda _: condition())
+        began = asked = time.monotonic()
+        while not condition():
+            time.sleep(0.01)
+            now = time.monotonic()
+            if now - began > PATIENCE:
+                raise TimeoutError(f"not met in {PATIENCE} s")
+            if now - asked > SECONDS_TO_A_FRAME:
+                cls.expect_frames()
+                asked = time.monotonic()
+
+    @classmethod
+    def expect_frames(cls):
+        """Throws NoFrames, with a new browser in place, where this one has stopped drawing."""
+        began = time.monotonic()
+        try:
+            cls.js("window.hasDrawn = false; requestAnimationFrame(() => { window.hasDrawn = true; })")
+            while time.monotonic() - began < SECONDS_TO_A_FRAME:
+                if cls.js("return window.hasDrawn"):
+                    return
+                time.sleep(0.01)
+        except WebDriverException:
+            pass
+        cls.browser.quit()
+        cls.start()
+        raise NoFrames
 
     @classmethod
     def js(cls, code, *arguments):
         return cls.browser.execute_script(code, *arguments)
 
     def tearDown(self):
+        self.expect_frames()
         self.messages += [entry["message"] for entry in self.browser.get_log("browser")]
         for entry in self.browser.get_log("performance"):
             message = json.loads(entry["message"])["message"]
