@@ -249,7 +249,11 @@ class TestPlanner {
     return fmt::format("{} samples a ray, {} of them the pilot's", judged + pilot_->taken, pilot_->taken);
   }
   std::string needed_in_all(std::uint64_t judged) const {
-    const auto digits = [](std::uint64_t samples) { return fmt::format("{:.2g}", static_cast<double>(samples)); };
+    const auto digits = [](std::uint64_t samples) {
+      // Rounded up: as many samples are enough.
+      const double unit = std::pow(10, std::max(0., std::floor(std::log10(static_cast<double>(samples))) - 1));
+      return fmt::format("{:.2g}", unit * std::ceil(static_cast<double>(samples) / unit));
+    };
     return pilot_ && pilot_->taken > 0 ? digits(with_a_pilot(judged)) + " in all" : digits(judged);
   }
 

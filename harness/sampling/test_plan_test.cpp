@@ -46,5 +46,29 @@ TEST(TestPlan, AdvisesOnlyWhatWouldHelp) {
       EXPECT_NE(advice(SampleRange::any_sign, bounding).find(remedy), std::string::npos);
 }
 
+TEST(TestPlan, AsksForNoLessThanItPlans) {
+  Scene scene;
+  const auto rays = std::make_shared<BuiltRays>();
+  rays->world.resize(1);
+  scene.rays = rays;
+  scene.bounding = true;
+  Cell cell;
+  cell.samples_per_ray = 4;
+  Targets targets;
+  targets.mean = {0.5};
+  targets.error = {1e-12};
+  for (Real variance = 0.01; variance < 0.25; variance *= 1.07) {
+    CellTheory theory;
+    theory.variance = {variance};
+    theory.ray_variance = {variance};
+    const TestPlan plan = plan_tests(cell, scene, targets, SampleRange::unit, Guarantee::unbiased, theory, {}, {});
+    const std::size_t needs = plan.undecidable.find(" needs ");
+    ASSERT_NE(needs, std::string::npos) << plan.undecidable;
+    const double told = std::stod(plan.undecidable.substr(needs + 7));
+    EXPECT_GE(told, static_cast<double>(plan.planned)) << plan.undecidable;
+    EXPECT_LE(told, 1.1 * static_cast<double>(plan.planned)) << plan.undecidable;
+  }
+}
+
 }  // namespace
 }  // namespace nullmark
