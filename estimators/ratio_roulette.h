@@ -26,8 +26,8 @@ struct RatioRoulette {
 
   void check(const MatterBounds&) const {
     if (survival < threshold)
-      throw ParameterError("survival", "found " + std::to_string(survival) + ", below the threshold " +
-                                           std::to_string(threshold) + ": weights would exceed 1");
+      throw ParameterError("survival", "found " + std::to_string(survival) + "; expected at least the threshold, " +
+                                           std::to_string(threshold) + ": else weights would exceed 1");
   }
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }

@@ -243,16 +243,33 @@ TEST_F(Cli, TimingTellsHowFarItIs) {
   EXPECT_NE(read("err").find("timing 1/2\ntiming 2/2\n"), std::string::npos) << read("err");
 }
 
+TEST_F(Cli, AGreyTrackerNamesTheMediumThatItDoesNotTake) {
+  write("t.json", R"({"nullmark":"config/2","experiments":[{"name":"e","rays":"single","samples_per_ray":10,"matrix":{
+      "estimator":["ratio","analog_decomposition"],"medium":["linear",{"type":"linear","spectrum":[0.5,2]}]}}]})");
+  EXPECT_EQ(run("run t.json"), 2);
+  EXPECT_NE(
+      read("err").find("t.json: /experiments/0/matrix/estimator/1/type: analog_decomposition takes grey media only; expected one "
+                       "channel, found 2; sweep chromatic media in another experiment"),
+      std::string::npos)
+      << read("err");
+  EXPECT_NE(read("err").find("(medium linear/spectrum:0.5,2)"), std::string::npos) << read("err");
+}
+
 TEST_F(Cli, ProveTellsWhichMembersItFound) {
   // It throws in every flight, so it ends at once.
   EXPECT_EQ(run("prove '{\"type\":\"faulty\",\"fault\":\"throws\"}' --quick", NULLMARK_FAULTY_PROGRAM),
             code(ExitCode::internal_error));
   const std::string text = read("out");
-  const std::size_t used = text.find("\nuses: theory, "), others = text.find("; not stated: ");
+  const std::size_t used = text.find("\nuses: theory, "), others = text.find("\nnot stated: ");
   ASSERT_NE(used, std::string::npos) << text;
   EXPECT_LT(used, text.find("transmittance_at"));
   EXPECT_LT(text.find("transmittance_at"), others);
   EXPECT_LT(others, text.find("event"));
+  for (std::size_t begin = used + 1; begin < text.find("\nscenes ");) {
+    const std::size_t end = text.find('\n', begin);
+    EXPECT_LE(end - begin, 100u) << text.substr(begin, end - begin);
+    begin = end + 1;
+  }
 }
 
 TEST_F(Cli, ListsSchemasAndVersion) {

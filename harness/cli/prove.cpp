@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <functional>
@@ -36,15 +35,30 @@ Json component_argument(const std::string& text) {
   return first != std::string::npos && text[first] == '{' ? parse_json(text, "prove") : Json(text);
 }
 
-/// "uses: theory, event; not stated: count_law, ...": a slip in the name of a member shows nowhere else.
+/// "uses: theory, event" in lines of a terminal's width.
+std::string list_text(std::string line, const std::vector<std::string>& members) {
+  constexpr std::size_t kWidth = 100;
+  std::string text;
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const std::string member = members[i] + (i + 1 < members.size() ? "," : "");
+    if (line.size() + 1 + member.size() > kWidth) {
+      text += line + "\n";
+      line = " ";
+    }
+    line += " " + member;
+  }
+  return text + line + "\n";
+}
+
+/// Which optional members a tracker has: a slip in the name of one shows nowhere else.
 std::string members_text(const std::string& type) {
   std::vector<std::string> used, others;
   for (const auto& [member, has] : Registry<EstimatorEntry>::instance().find(type)->members)
     (has ? used : others).push_back(member);
   // Of a tracker from outside there is no header with members.
   if (used.empty() && others.empty()) return "";
-  return fmt::format("uses: {}; not stated: {}\n", used.empty() ? "no optional member" : fmt::format("{}", fmt::join(used, ", ")),
-                     fmt::join(others, ", "));
+  if (used.empty()) used = {"no optional member"};
+  return list_text("uses:", used) + list_text("not stated:", others);
 }
 
 /// Runs the battery and hands its results to `conclude`.

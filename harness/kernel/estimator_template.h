@@ -57,7 +57,8 @@ class EstimatorTemplate final : public EstimatorSource {
   void check(const MatterBounds& medium) const override {
     if (kGreyOnly && medium.minimum.size() > 1)
       throw ParameterError("type", std::string(Estimator<Real>::kName) + " takes grey media only; expected one channel, found " +
-                                       std::to_string(medium.minimum.size()) + "; \"spectral\" takes chromatic media");
+                                       std::to_string(medium.minimum.size()) +
+                                       "; sweep chromatic media in another experiment, or take \"spectral\"");
     if constexpr (Traits::kCheck) grey_.check(medium);
   }
   std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64, bool lanes = true) const override {

@@ -23,7 +23,9 @@ Earlier earlier_results(const Plan& plan, const std::string& output, const Journ
   if (std::filesystem::exists(output)) {
     RunRecord before = read_results(read_file(output), output);
     if (before.config_text != plan.config_text)
-      throw InputError(output + ": holds results of another configuration or seed; --force replaces them");
+      throw InputError(output +
+                       ": holds results of another configuration or seed; --resume adds to those of the same alone, and --force "
+                       "replaces them");
     const Build build = build_of(before.provenance);
     expect_joinable(output, build, "this program", this_build(), builds);
     for (CellRecord& record : before.cells) mark_build(record, build, this_build());

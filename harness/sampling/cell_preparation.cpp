@@ -116,7 +116,15 @@ void CellPreparer::subtract(PreparedCell& prepared, const Component& tracker) {
 void CellPreparer::add_tracker(PreparedCell& prepared, const Component& tracker) {
   const Cell& cell = *prepared.cell;
   const std::shared_ptr<const EstimatorSource> source = located(tracker.pointer, [&] { return make_estimator(tracker); });
-  located(tracker.pointer, [&] { return source->check(prepared.scene->medium->extrema), 0; });
+  located(tracker.pointer, [&] {
+    try {
+      source->check(prepared.scene->medium->extrema);
+    } catch (const ParameterError& error) {
+      // Of a swept medium the tracker's pointer says nothing.
+      throw ParameterError(error.parameter, fmt::format("{} (medium {})", error.what(), plan_.media[cell.medium]->label));
+    }
+    return 0;
+  });
   // A tracker from outside is opened here.
   located(tracker.pointer, [&] {
     prepared.claim = source->claim(cell.quantity);
