@@ -78,7 +78,8 @@ namespace nullmark {
 //   static constexpr bool kGreyOnly
 //       takes media of one channel; no kernel of several is compiled
 //   static constexpr bool kOwnFlights
-//       draws its flights by its own law
+//       lookups are no tentative collisions at the ray's majorant: flights start on other rates, or use other draws.  The harness
+//       predicts no lookups from the majorant and draws no exponentials ahead
 //   static constexpr bool kDrawsExponentials
 //       with kOwnFlights: most steps draw an exponential first, so the loop takes the logarithms of a block together
 //   static constexpr bool kLanes = true

@@ -49,8 +49,7 @@ class LaneRates {
 
 template <class T, std::size_t N>
 Lanes<T, N> rate_of(const Rates& rates, LaneIndex<T, N> piece) {
-  const RatePiece<T>* const pieces = rates.pieces<T>();
-  return rates.size() > 1 ? piece.template gathered<6>(&pieces->rate) : Lanes<T, N>(pieces->rate);
+  return LaneRates<T, N>(rates).template rate<true>(piece);
 }
 
 /// Where N walks are.
