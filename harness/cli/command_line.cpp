@@ -267,7 +267,8 @@ class CommandLine {
     CLI::App* command =
         add("report", "Write one self-contained page with tables and plots", [this] { return report_command(report_); });
     command->add_option("RESULTS", report_.results, "Results files")->required();
-    command->add_option("-o,--output", report_.output, "HTML file to write; replaces an existing file")->required();
+    command->add_option("-o,--output", report_.output,
+                        "HTML file to write, by default that of the first results with .html; replaces an existing page");
     command->add_option("--baseline", report_.baseline, "Estimator to compare the others with");
     command->add_option("--figures", report_.figures, "Folder for the main plots as PNG, SVG and PDF; needs Chromium");
     command->add_option("--markdown", report_.markdown, "Also write the rankings for a pull request");

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "harness/cli/commands.h"
 #include "harness/io/file_io.h"
 #include "harness/io/notice.h"
@@ -14,8 +16,21 @@
 #include "harness/report/warnings.h"
 
 namespace nullmark {
+namespace {
 
-ExitCode report_command(const ReportCommand& command) {
+/// "c.html" of "results/c.results.json.gz", in the current folder, where `run` puts its results.
+std::string default_page(const std::string& results) {
+  std::string name = std::filesystem::path(results).filename().string();
+  for (const std::string_view ending : {".gz", ".json", ".results"})
+    if (name.ends_with(ending)) name.resize(name.size() - ending.size());
+  return name + ".html";
+}
+
+}  // namespace
+
+ExitCode report_command(const ReportCommand& given) {
+  ReportCommand command = given;
+  if (command.output.empty()) command.output = default_page(command.results[0]);
   refuse_overwriting_others(command.results, {{command.output, page_beginning()}, {command.markdown, "### nullmark compare"}});
   if (!command.figures.empty()) expect_figures_possible(command.figures);
   std::vector<RunRecord> runs;
