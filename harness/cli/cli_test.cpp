@@ -208,6 +208,18 @@ TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
   EXPECT_NE(read("out").find("compare"), std::string::npos);
 }
 
+TEST_F(Cli, APageIsNamedAfterTheFirstResults) {
+  std::filesystem::create_directory(folder_ / "folder");
+  ASSERT_EQ(run("run c.json -o folder/some.results.json"), 0) << read("err");
+  EXPECT_EQ(run("report folder/some.results.json folder/some.results.json"), 0) << read("err");
+  EXPECT_EQ(read("err"), "report: some.html\n");
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "some.html"));
+  write("own.html", "a page of somebody else");
+  std::filesystem::rename(folder_ / "folder/some.results.json", folder_ / "own.json");
+  EXPECT_EQ(run("report own.json"), code(ExitCode::input_error));
+  EXPECT_EQ(read("own.html"), "a page of somebody else");
+}
+
 TEST_F(Cli, UniformNextEventsUnderNarrowPhaseFunctionsAreWarnedOf) {
   for (const char* next_event : {"uniform", "mis"})
     for (const Real anisotropy : {0.5, -0.9}) {
@@ -310,6 +322,18 @@ TEST_F(Cli, ListsOneByItsName) {
   EXPECT_EQ(read("err"), "nullmark: list media: found \"linaer\"; did you mean \"linear\"?\n");
   EXPECT_EQ(run("list rays nothing_like_it"), 2);
   EXPECT_EQ(read("err"), "nullmark: list rays: found \"nothing_like_it\"; `list rays` shows all of them\n");
+}
+
+/// Its own pilot is too small to be trusted.
+TEST_F(Cli, ADryRunLeavesTheVerdictToThePilotOfTheRun) {
+  for (const auto& [samples, verdict] : {std::pair{1000, " INCONCLUSIVE  ok"}, {1'000'000, "by pilot  ok"}}) {
+    write("p.json",
+          fmt::format(R"({{"nullmark":"config/2","timing":{{"enabled":false}},"experiments":[{{"name":"e","rays":"single",
+        "samples_per_ray":{},"matrix":{{"estimator":"ratio_roulette","medium":"linear"}}}}]}})",
+                      samples));
+    EXPECT_EQ(run("run p.json --dry-run"), 0) << read("err");
+    EXPECT_NE(read("out").find(verdict), std::string::npos) << read("out");
+  }
 }
 
 TEST_F(Cli, ADryRunOfNothingEndsAsTheRunWould) {

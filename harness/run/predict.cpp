@@ -60,8 +60,14 @@ void predict(const PreparedCell& prepared, const TestLevels& levels, double rays
     prediction.verdict = "not judged";
   else if (prepared.needs_bound && !prepared.scene->bounding)
     prediction.verdict = "VIOLATED";
+  else if (tests->undecidable.empty())
+    prediction.verdict = "PASS";
   else
-    prediction.verdict = tests->undecidable.empty() ? "PASS" : "INCONCLUSIVE";
+    // This pilot is too small to be trusted; that of the run may not be.
+    prediction.verdict =
+        demand.pilot > 0 && tests->planned <= std::max(demand.cell.samples_per_ray, demand.cell.verdict.max_samples_per_ray)
+            ? "by pilot"
+            : "INCONCLUSIVE";
   if (tests) prediction.planned = static_cast<std::uint64_t>(std::ceil(static_cast<double>(tests->planned) / rays_for_each));
   const double samples = demand.samples + demand.pilot + demand.laws;
   const SpanCost cost = span_cost(demand.whole, tests, demand.whole.samples_per_ray);
