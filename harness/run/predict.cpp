@@ -66,7 +66,7 @@ void predict(const PreparedCell& prepared, const TestLevels& levels, double rays
     // This pilot is too small to be trusted; that of the run may not be.
     prediction.verdict =
         demand.pilot > 0 && tests->planned <= std::max(demand.cell.samples_per_ray, demand.cell.verdict.max_samples_per_ray)
-            ? "by pilot"
+            ? "open"
             : "INCONCLUSIVE";
   if (tests) prediction.planned = static_cast<std::uint64_t>(std::ceil(static_cast<double>(tests->planned) / rays_for_each));
   const double samples = demand.samples + demand.pilot + demand.laws;

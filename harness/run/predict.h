@@ -15,7 +15,7 @@ struct Prediction {
   std::uint64_t rays = 0, samples_per_ray = 0;
   std::optional<double> lookups_per_sample, relative_variance;
   std::uint64_t planned = 0;  ///< samples per ray for a PASS without bias
-  std::string verdict;        ///< expected: "PASS", "by pilot", "INCONCLUSIVE", "VIOLATED" or "not judged"
+  std::string verdict;        ///< expected: "PASS", "open", "INCONCLUSIVE", "VIOLATED" or "not judged"
   std::string status;         ///< "ok" or the reason why it would be skipped
   double seconds = 0;         ///< of CPU, without timing
 };
