@@ -63,7 +63,7 @@ void predict(const PreparedCell& prepared, const TestLevels& levels, double rays
   else if (tests->undecidable.empty())
     prediction.verdict = "PASS";
   else
-    // This pilot is too small to be trusted; that of the run may not be.
+    // This pilot is too small to be trusted; the pilot of the run is larger.
     prediction.verdict =
         demand.pilot > 0 && tests->planned <= std::max(demand.cell.samples_per_ray, demand.cell.verdict.max_samples_per_ray)
             ? "open"

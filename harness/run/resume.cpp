@@ -24,8 +24,7 @@ Earlier earlier_results(const Plan& plan, const std::string& output, const Journ
     RunRecord before = read_results(read_file(output), output);
     if (before.config_text != plan.config_text)
       throw InputError(output +
-                       ": holds results of another configuration or seed; --resume adds to those of the same alone, and --force "
-                       "replaces them");
+                       ": holds results of another configuration or seed; --resume needs the same, and --force replaces them");
     const Build build = build_of(before.provenance);
     expect_joinable(output, build, "this program", this_build(), builds);
     for (CellRecord& record : before.cells) mark_build(record, build, this_build());

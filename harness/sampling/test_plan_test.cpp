@@ -7,8 +7,9 @@
 namespace nullmark {
 namespace {
 
-/// The advice for one ray of mean 1/2, without theory and with a pilot that shows a heavy tail.
-std::string advice(SampleRange range, bool bounding, Quantity quantity = Quantity::transmittance) {
+/// The plan for one ray of mean 1/2.
+TestPlan plan_of(std::uint64_t samples, SampleRange range, bool bounding, const CellTheory& theory,
+                 const std::optional<Pilot>& pilot, Quantity quantity = Quantity::transmittance) {
   Scene scene;
   const auto rays = std::make_shared<BuiltRays>();
   rays->world.resize(1);
@@ -16,12 +17,16 @@ std::string advice(SampleRange range, bool bounding, Quantity quantity = Quantit
   scene.bounding = bounding;
   Cell cell;
   cell.quantity = quantity;
-  cell.samples_per_ray = 1024;
+  cell.samples_per_ray = samples;
   Targets targets;
   targets.mean = {0.5};
   targets.error = {1e-12};
-  const Pilot pilot{{0.1}, {1}, 1000, 1000, 1};
-  return plan_tests(cell, scene, targets, range, Guarantee::unbiased, {}, pilot, {}).remedies;
+  return plan_tests(cell, scene, targets, range, Guarantee::unbiased, theory, pilot, {});
+}
+
+/// Without theory and with a pilot that shows a heavy tail.
+std::string advice(SampleRange range, bool bounding, Quantity quantity = Quantity::transmittance) {
+  return plan_of(1024, range, bounding, {}, Pilot{{0.1}, {1}, 1000, 1000, 1}, quantity).remedies;
 }
 
 TEST(TestPlan, AdvisesOnlyWhatWouldHelp) {
@@ -47,21 +52,11 @@ TEST(TestPlan, AdvisesOnlyWhatWouldHelp) {
 }
 
 TEST(TestPlan, AsksForNoLessThanItPlans) {
-  Scene scene;
-  const auto rays = std::make_shared<BuiltRays>();
-  rays->world.resize(1);
-  scene.rays = rays;
-  scene.bounding = true;
-  Cell cell;
-  cell.samples_per_ray = 4;
-  Targets targets;
-  targets.mean = {0.5};
-  targets.error = {1e-12};
   for (Real variance = 0.01; variance < 0.25; variance *= 1.07) {
     CellTheory theory;
     theory.variance = {variance};
     theory.ray_variance = {variance};
-    const TestPlan plan = plan_tests(cell, scene, targets, SampleRange::unit, Guarantee::unbiased, theory, {}, {});
+    const TestPlan plan = plan_of(4, SampleRange::unit, true, theory, {});
     const std::size_t needs = plan.undecidable.find(" needs ");
     ASSERT_NE(needs, std::string::npos) << plan.undecidable;
     const double told = std::stod(plan.undecidable.substr(needs + 7));
