@@ -59,6 +59,12 @@ class Flight {
     return advance_to(depth);
   }
 
+  /// The same, cell by cell from where the flight is: for points nearby.
+  bool travel_to(Real depth) {
+    while (piece_ > 0 && depth < rates_->known(piece_ - 1).depth_after) --piece_;
+    return advance_to(depth);
+  }
+
   /// Puts the walk at a distance chosen by the estimator itself (marches).
   void jump(Real position) { position_ = position; }
 

@@ -91,6 +91,24 @@ TEST(Flight, RewindingCostsOneDrawPerCellAndKeepsTheCount) {
   EXPECT_NEAR(collisions / kFlights, 20, 5.5 * std::sqrt(20. / kFlights));
 }
 
+TEST(Flight, TravelsBothWaysToWhereItLands) {
+  Rates rates;
+  rates.start(0);
+  for (int i = 0; i < 20; ++i) rates.append(i + 1, i % 4 == 1 ? 0 : 1 + i % 3);
+  Rng rng(SampleAddress{3, 1, 4});
+  Flight travels, lands;
+  travels.start(rates);
+  lands.start(rates);
+  const Real total = rates.total_depth();
+  // Ends of cells and depths beyond the ray's end as well.
+  for (int i = 0; i < 500; ++i) {
+    const Real depth = i % 5 == 0 ? rates.depth_before(static_cast<std::size_t>(i / 5) % 20) : rng.uniform() * total * 1.05;
+    ASSERT_EQ(travels.travel_to(depth), lands.land(depth)) << depth;
+    ASSERT_EQ(travels.position(), lands.position()) << depth;
+    if (depth < total) ASSERT_EQ(travels.piece(), lands.piece()) << depth;
+  }
+}
+
 TEST(Flight, ZeroExponentialsStayWhereTheyAre) {
   const Rates rates = two_rates();
   Flight flight;
