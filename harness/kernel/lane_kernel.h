@@ -183,6 +183,8 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     Counters& counters;
     Rates rates = {}, majorant = Rates(state.ray.majorant);
     std::array<T, 3> origin = narrowed(context.local.origin), direction = narrowed(context.local.direction);
+    const Medium* field = &medium;  ///< looked up: the medium, or what it multiplies by its factors
+    Value factors = 1;
 
     static std::array<T, 3> narrowed(const Vec3& v) {
       return {static_cast<T>(v.x()), static_cast<T>(v.y()), static_cast<T>(v.z())};
@@ -194,6 +196,9 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     [[gnu::flatten]] void block(std::size_t count) {
       Tally tally{.walks = count};
       std::size_t lanes = (count + N - 1) / N * N;
+      // One number a lookup, multiplied in registers, takes less time than a spectrum in memory.
+      if constexpr (C > 1)
+        if (const auto parts = medium.scaled()) field = parts->grey, factors = Value(parts->factors);
       for (std::size_t axis = 0; axis < 3; ++axis)
         if (!moves_along(axis)) std::fill_n(state.points[axis].begin(), lanes, origin[axis]);
       for (std::size_t k = 0; k < lanes; k += N) set_out(k, tally);
@@ -205,7 +210,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
           break;
         }
         const auto& [x, y, z] = state.points;
-        medium.extinction(BasicPoints<T>{x.data(), y.data(), z.data(), looked_up(tally.walks)}, state.extinction.data());
+        field->extinction(BasicPoints<T>{x.data(), y.data(), z.data(), looked_up(tally.walks)}, state.extinction.data());
         if (rates.has_several())
           go_on<true>(lanes, step, tally);
         else
@@ -217,6 +222,12 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       counters.lookups += tally.lookups;
       counters.violations += tally.violations;
       if constexpr (!Traits::kIgnoresMajorant) counters.null_collisions += tally.lookups - tally.real;
+    }
+
+    [[gnu::always_inline]] Value extinction_at(std::size_t k) const {
+      if constexpr (C > 1)
+        if (field != &medium) return factors * Value(Pack::load(&state.extinction[k]));
+      return Value::load(&state.extinction[k * C]);
     }
 
     /// Number of lanes that look the medium up.  Where the last register is at most half full, its walks look up one by one: the
@@ -260,7 +271,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       });
       LaneFlight<T, N, several> flight(rates, walks.place, step);
       Streams rng(walks.stream, alive);
-      const Value extinction = Value::load(&state.extinction[k * C]);
+      const Value extinction = extinction_at(k);
       if constexpr (!Traits::kIgnoresMajorant)
         audit_majorant(largest(extinction), majorant.template rate<several>(flight.piece()), alive, tally.violations,
                        counters.largest_violation);

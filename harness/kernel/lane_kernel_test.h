@@ -60,7 +60,7 @@ inline std::shared_ptr<const Medium> volume() {
   return std::make_shared<FilteredVolume<TrilinearFilter>>(std::move(data), Real{40});
 }
 
-/// Media and bounds of which each asks something else of a walk; in colour where a spectrum is given.
+/// Media and bounds of which each asks something else of a walk; in colour where a spectrum of at most four channels is given.
 inline std::vector<Case> cases(const std::vector<Real>& spectrum = {}) {
   GaussianBump bump;
   bump.profile.amplitude = 9;
@@ -71,8 +71,7 @@ inline std::vector<Case> cases(const std::vector<Real>& spectrum = {}) {
   ExponentialCube cube;
   const Ray slanted{{0.02, 0.1, 0.3}, Vec3(1, 0.5, 0.25).normalized(), 0, kInfinity};
   std::vector<Case> all;
-  const auto add = [&](const std::string& name, std::shared_ptr<const Medium> medium, const Ray& world) {
-    if (!spectrum.empty()) medium = std::make_shared<Spectral>(medium, spectrum);
+  const auto under_bounds = [&](const std::string& name, std::shared_ptr<const Medium> medium, const Ray& world) {
     const auto with = [&](const std::string& majorant, std::shared_ptr<const MajorantStructure> structure) {
       all.push_back({name + "/" + majorant, medium, std::move(structure), world});
     };
@@ -80,6 +79,10 @@ inline std::vector<Case> cases(const std::vector<Real>& spectrum = {}) {
     with("violated", std::make_shared<GlobalMajorant>(*medium, 0.7));
     with("grid", std::make_shared<GridMajorant>(*medium, std::array{7, 3, 5}, 1));
     with("rewind", std::make_shared<GridMajorant>(*medium, std::array{7, 3, 5}, 1.2, Crossing::rewind));
+  };
+  const auto add = [&](const std::string& name, std::shared_ptr<const Medium> medium, const Ray& world) {
+    if (!spectrum.empty()) medium = std::make_shared<Spectral>(medium, spectrum);
+    under_bounds(name, medium, world);
   };
   cube.profile.x0 = 0.01;
   add("constant", constant(3), slanted);
@@ -92,6 +95,11 @@ inline std::vector<Case> cases(const std::vector<Real>& spectrum = {}) {
   add("volume along x", volume(), {{-1, 0.4, 0.6}, {1, 0, 0}, 0, kInfinity});
   add("volume along -y", volume(), {{0.4, 2, 0.6}, {0, -1, 0}, 0, kInfinity});
   add("volume along z", volume(), {{0.6, 0.4, -1}, {0, 0, 1}, 0, kInfinity});
+  if (!spectrum.empty()) {
+    std::vector<std::shared_ptr<const Medium>> channels = {built(bump), built(hole), constant(2), built(cosine)};
+    channels.resize(spectrum.size());
+    under_bounds("a field for each channel", std::make_shared<PerChannel>(channels), slanted);
+  }
   return all;
 }
 
