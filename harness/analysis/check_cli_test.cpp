@@ -101,6 +101,22 @@ TEST_F(Check, OnlyOpenVerdictsAreNoSuccess) {
   EXPECT_NE(read("out").find(" samples a ray: raise \"max_samples_per_ray\""), std::string::npos) << read("out");
 }
 
+TEST_F(Check, NoOneIsToldToDrawMoreThanAnyRunCan) {
+  write("d.json", config(R"("rays":"single","samples_per_ray":100,"matrix":{"estimator":["delta"],
+      "medium":[{"type":"homogeneous","extinction":[2,40]}]})"));
+  ASSERT_EQ(run("run d.json -o r.json"), 0) << read("err");
+  EXPECT_EQ(run("check r.json"), 77) << read("out");
+  EXPECT_NE(
+      read("out").find("1 cell that is INCONCLUSIVE as planned needs more than 1e+09 samples a ray: the variance is too high "
+                       "for this epsilon"),
+      std::string::npos)
+      << read("out");
+  const std::string wanted = "cells that are INCONCLUSIVE as planned need up to ";
+  const std::size_t at = read("out").find(wanted);
+  ASSERT_NE(at, std::string::npos) << read("out");
+  EXPECT_LT(std::stoull(read("out").substr(at + wanted.size())), 1'000'000'000u) << read("out");
+}
+
 TEST_F(Check, NothingJudgedIsNoSuccess) {
   write(
       "n.json",

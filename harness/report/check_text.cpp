@@ -65,6 +65,9 @@ std::string reasons_of_untested(const RunRecord& run) {
   return text;
 }
 
+/// At 100 ns a sample, minutes for each ray.
+constexpr std::uint64_t kMostAdvised = 1'000'000'000;
+
 /// What keeps a run whose cells are good from being a success, and what was left out on purpose.
 std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary) {
   std::vector<std::string> lines;
@@ -86,15 +89,26 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
   lines.insert(lines.end(), summary.disagreements.begin(), summary.disagreements.end());
   // Of samples that were handed in, no key allows more.
   std::uint64_t wanted = 0;
-  for (const CellRecord& record : run.cells)
-    if (!record.tracker.unrepeatable && kind_of(record) == Kind::expected_open &&
-        record.verdict->planned > record.verdict->affordable)
+  std::size_t hopeless = 0;
+  for (const CellRecord& record : run.cells) {
+    if (record.tracker.unrepeatable || kind_of(record) != Kind::expected_open ||
+        record.verdict->planned <= record.verdict->affordable)
+      continue;
+    if (record.verdict->planned > kMostAdvised)
+      ++hopeless;
+    else
       wanted = std::max(wanted, record.verdict->planned);
+  }
   if (wanted > 0)
     lines.push_back(
         fmt::format("cells that are INCONCLUSIVE as planned need up to {} samples a ray: raise \"max_samples_per_ray\" or "
                     "\"max_lookups_per_ray\" in \"verdict\" of their experiments, and run again",
                     wanted));
+  if (hopeless > 0)
+    lines.push_back(
+        fmt::format("{} INCONCLUSIVE as planned need{} more than {:.0e} samples a ray: the variance is too high for this epsilon",
+                    hopeless == 1 ? "1 cell that is" : fmt::format("{} cells that are", hopeless), hopeless == 1 ? "s" : "",
+                    static_cast<double>(kMostAdvised)));
   lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());
   if (!summary.nothing_proven.empty()) lines.push_back(summary.nothing_proven);
   for (const ClaimFinding& one : summary.findings)

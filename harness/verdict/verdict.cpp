@@ -119,7 +119,7 @@ struct Found {
 };
 
 /// The outcome of the means, with its reason or what it proves.
-void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std::string>& outputs) {
+void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std::string>& outputs, const std::string& range) {
   Outcome& outcome = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
   const Real alpha = verdict.alpha / static_cast<Real>(verdict.family);
   const bool drawn_as_planned = verdict.tolerate == Tolerate::epsilon || verdict.samples_per_ray >= verdict.planned;
@@ -136,7 +136,8 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
     verdict.reason = samples_that(verdict.nonfinite, "is", "are") + " not finite";
   } else if (verdict.out_of_range > 0) {
     outcome = Outcome::fail;
-    verdict.reason = samples_that(verdict.out_of_range, "lies", "lie") + " outside the declared range";
+    verdict.reason = samples_that(verdict.out_of_range, "lies", "lie") + " outside the declared range" +
+                     (range.empty() ? "" : " (" + range + ")");
     if (found.failed)
       verdict.reason += "; " + place_of(*found.failed, outputs, found.means) + without_proof(*found.failed, alpha, "that range");
   } else if (found.failed) {
@@ -165,7 +166,7 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
 
 }  // namespace
 
-void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
+void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs, const std::string& range) {
   const bool lenient = verdict.tolerate == Tolerate::epsilon;
   const auto outcome_of = [&](const Proof& proof) {
     if (proof.beyond || (proof.biased && !lenient)) return Outcome::fail;
@@ -194,7 +195,7 @@ void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs) {
   }
   verdict.within = found.means > 0 && found.within.size() == found.means;
   decide_laws(verdict);
-  conclude(verdict, found, outputs);
+  conclude(verdict, found, outputs, range);
 }
 
 Real excluded_bias(const VerdictRecord& verdict) {
