@@ -7,6 +7,7 @@
 
 #include "estimators/mis_bidirectional.h"
 #include "estimators/mis_unidirectional.h"
+#include "estimators/next_flight_ratio.h"
 #include "harness/testing/built_media.h"
 #include "harness/testing/hand_walked.h"
 
@@ -156,6 +157,16 @@ TEST(BidirectionalMis, TightBoundsHaveTheLawOfTwoCoins) {
   const Spread spread = spread_of(1 << 18, [&] { return hand.walk(sample++).result; });
   EXPECT_NEAR(spread.mean, t, kSigmas * spread.mean_error);
   EXPECT_NEAR(spread.variance, 2 * t * (1 - t) * unit * unit, kSigmas * spread.variance_error);
+}
+
+/// Constant mu = 1 over a length of 1 below mub = 1 + d: Var = d^2/e int_0^1 e^-s (1 - s)^2 ds = d^2 (1 - 2/e)/e up to d^3.
+TEST(NextFlightRatio, VarianceBelowABoundThatIsHardlyLoose) {
+  for (const Real d : {1e-4, 1e-6, 1e-8, 1e-11}) {
+    const Real variance = *HandWalked<NextFlightRatioTracking>({}, constant(1), 1, 1 + d).theory().variance;
+    const Real loose = (1 + d) - 1;  // as it is in double
+    EXPECT_NEAR(variance / (loose * loose), (1 - 2 * std::exp(-1.)) * std::exp(-1.), 1e-4 + 4 * d) << d;
+  }
+  EXPECT_LT(*HandWalked<NextFlightRatioTracking>({}, constant(1), 1, 1).theory().variance, 1e-30);
 }
 
 /// Thick bounds: e^gap overflows, pairs are many, T is not small.

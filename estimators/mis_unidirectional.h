@@ -39,15 +39,21 @@ struct UnidirectionalMis {
 
   Value result(const Walk& walk, const auto&) const { return walk.sum + walk.last; }
 
-  /// From a vertex, S = c + (c if the flight leaves, else a S of the next vertex), and the mean of the latter is T - c - v c, so
-  /// g = c^2 + 2 c (T - v) + 3 v c^2 in vertex_sum_variance.  Nothing where the panels do not resolve v.
+  /// From a vertex, S = c + (c if the flight leaves, else a S of the next vertex), a = 1 - mu/mub, and the mean of the latter is
+  /// T
+  /// - c - v c.  So a vertex of weight 1 adds g = c^2 + 2 c (T - v) + 3 v c^2, and E[S^2] = g(0) + int mub E[W^2] a^2 g dy.
+  /// Nothing where the panels do not resolve v.
   Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int channel, Quantity) const {
-    Theory theory{.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
+    const Real tau = profile.optical_depth(channel), total = ray.majorant.total_depth();
+    Theory theory{.lookups = total, .lookups_variance = total};
     if (!profile.resolved()) return theory;
-    theory.variance = vertex_sum_variance(ray, profile, channel, [](Real depth_left, Real tau_left) {
+    const auto second = [](Real depth_left, Real tau_left) {
       const Real v = std::exp(-depth_left), c = v / (1 + v);
       return c * (c + 2 * (std::exp(-tau_left) - v) + 3 * v * c);
-    });
+    };
+    const Real rest = integral_over_vertices(
+        ray, profile, channel, [&](Real a, Real depth_left, Real tau_left) { return a * a * second(depth_left, tau_left); });
+    theory.variance = std::max<Real>(0, second(total, tau) + rest - std::exp(-2 * tau));
     return theory;
   }
 

@@ -35,14 +35,16 @@ struct NextFlightRatioTracking {
 
   Value result(const Walk& walk, const auto&) const { return walk.sum; }
 
-  /// A vertex has v = exp(-majorant depth left) and g = v (2 T - v) in vertex_sum_variance.  Nothing where the panels do not
-  /// resolve v.
+  /// Let v and T be the transmittances of the majorant and of the medium over what is left of the ray.  A walk of weight W
+  /// expects W (T - v) more between vertices, and W (1 - mu/mub) T from a vertex on.  A vertex thus changes what is expected by
+  /// W (v - mu/mub T), and Var = int mub E[W^2] (v - mu/mub T)^2 dy.  This is no difference of large numbers, so it is 0 under a
+  /// tight bound and right under one that is hardly looser.  Nothing where the panels do not resolve v.
   Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     Theory theory{.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
     if (!profile.resolved()) return theory;
-    theory.variance = vertex_sum_variance(ray, profile, c, [](Real depth_left, Real tau_left) {
-      const Real v = std::exp(-depth_left);
-      return v * (2 * std::exp(-tau_left) - v);
+    theory.variance = integral_over_vertices(ray, profile, c, [](Real a, Real depth_left, Real tau_left) {
+      const Real change = std::exp(-depth_left) - (1 - a) * std::exp(-tau_left);
+      return change * change;
     });
     return theory;
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "estimators/estimator.h"
 
 namespace nullmark {
@@ -62,13 +64,14 @@ struct TaylorPinkNoise {
   Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int i, Quantity) const {
     const Real depth = ray.majorant.total_depth();
     if (!(depth > 0)) return {.variance = 0, .lookups = 0, .lookups_variance = 0};
-    const auto moment = [&](int power) {
+    // E[(factor - from)^power]
+    const auto moment = [&](int power, Real from) {
       return profile.integrate(i, [&](const RayProfile::Node& at) {
         const Real rate = ray.majorant.rate(at.piece);
-        return rate > 0 ? rate * std::pow((rate - at.extinction) / rate * scale(ray), power) : 0;
+        return rate > 0 ? rate * std::pow((rate - at.extinction) / rate * scale(ray) - from, power) : 0;
       }) / depth;
     };
-    const Real m1 = moment(1), m2 = moment(2), square = c * c;
+    const Real m1 = moment(1, 0), m2 = moment(2, 0), square = c * c;
     // A_j r^j summed in closed form, and its derivative at 1.
     const auto sum = [&](Real z) { return std::exp(-std::log1p(-square * z) / square); };
     const Real terms = sum(1), slope = terms / (1 - square);
@@ -80,11 +83,26 @@ struct TaylorPinkNoise {
     // (G(m1) - G(m2))/(m1 - m2) of equal arguments is G'.
     const Real apart = m1 - m2, quotient = std::abs(apart) > 1e-8 ? (sum(m1) - sum(m2)) / apart : sum(m1) / (1 - square * m1);
     const Real start = attenuation(depth), mean = attenuation(profile.optical_depth(i));
-    theory.variance = std::max<Real>(0, start * start * (sum(m2) + 2 * m1 * quotient) - mean * mean);
+    theory.variance = start * start * (sum(m2) + 2 * m1 * quotient) - mean * mean;
+    // Where that is a difference of large numbers the factors are small.
+    if (*theory.variance < 1e-6 * mean * mean) theory.variance = start * start * variance_of_few(m1, m2, moment(2, m1));
     return theory;
   }
 
  private:
+  /// sum_i (A_i m2^i - A_i^2 m1^2i) (2 B_i - 1), B_i = sum_{j>=i} A_j m1^(j-i) / A_i, of small factors of variance `centred`.
+  Real variance_of_few(Real m1, Real m2, Real centred) const {
+    constexpr int kTerms = 16;
+    std::array<Real, kTerms + 1> chance = {1}, ahead;  // A_i, B_i
+    const auto survival = [&](int i) { return (1 + (i - 1) * c * c) / i; };
+    for (int i = 1; i <= kTerms; ++i) chance[i] = chance[i - 1] * survival(i);
+    ahead[kTerms] = 1;
+    for (int i = kTerms; i > 1; --i) ahead[i - 1] = 1 + m1 * survival(i) * ahead[i];
+    Real sum = centred * (2 * ahead[1] - 1);
+    for (int i = 2; i <= kTerms; ++i) sum += chance[i] * (std::pow(m2, i) - chance[i] * std::pow(m1, 2 * i)) * (2 * ahead[i] - 1);
+    return sum;
+  }
+
   Real attenuation(Real tau) const { return std::exp(-std::log1p(tau * c * c) / (c * c)); }
   Real scale(const MediumRay<Value>& ray) const {
     const Real depth = ray.majorant.total_depth();
