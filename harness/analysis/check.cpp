@@ -73,7 +73,7 @@ namespace {
 void count_cell(CellRecord& record, Summary& summary) {
   if (record.verdict && record.status == Status::ok) {
     const VerdictRecord before = *record.verdict;
-    decide(*record.verdict, record.outputs);
+    decide(*record.verdict, record.outputs, record.range);
     const VerdictRecord& after = *record.verdict;
     summary.altered += before.unbiased != after.unbiased || before.own_mean != after.own_mean ||
                        before.lookups != after.lookups || before.lawful != after.lawful;

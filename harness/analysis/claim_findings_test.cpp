@@ -198,7 +198,7 @@ TEST(Findings, TheTextHasTheWordTheWorstCellAndByHowMuch) {
   EXPECT_NE(text.find("C1: refuted: Nothing varies by more than 1."), std::string::npos) << text;
   EXPECT_NE(text.find("1 of 3 cells bear it out, 2 do not; the worst: b: variance 3"), std::string::npos) << text;
   EXPECT_NE(text.find("(3 times it)"), std::string::npos) << text;
-  EXPECT_NE(text.find("1 claims: 0 reproduced, 1 refuted"), std::string::npos) << text;
+  EXPECT_NE(text.find("1 claim: 0 reproduced, 1 refuted"), std::string::npos) << text;
   EXPECT_NE(findings_markdown(findings(run)).find("| C1 | **refuted** |"), std::string::npos);
   run.claims[0].parts[0].numbers.clear();
   run.claims[0].parts[0].others = {"b", "a", "a"};

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <optional>
+#include <variant>
 
 #include "estimators/walk/lane_flight.h"
 #include "harness/kernel/block_kernel.h"
@@ -183,8 +185,8 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     Counters& counters;
     Rates rates = {}, majorant = Rates(state.ray.majorant);
     std::array<T, 3> origin = narrowed(context.local.origin), direction = narrowed(context.local.direction);
-    const Medium* field = &medium;  ///< looked up: the medium, or what it multiplies by its factors
-    Value factors = 1;
+    /// Those by which a coloured medium multiplies a grey field, which is then looked up.
+    std::conditional_t<(C > 1), std::optional<Value>, std::monostate> factors = {};
 
     static std::array<T, 3> narrowed(const Vec3& v) {
       return {static_cast<T>(v.x()), static_cast<T>(v.y()), static_cast<T>(v.z())};
@@ -196,6 +198,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     [[gnu::flatten]] void block(std::size_t count) {
       Tally tally{.walks = count};
       std::size_t lanes = (count + N - 1) / N * N;
+      const Medium* field = &medium;
       // One number a lookup, multiplied in registers, takes less time than a spectrum in memory.
       if constexpr (C > 1)
         if (const auto parts = medium.scaled()) field = parts->grey, factors = Value(parts->factors);
@@ -226,7 +229,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
 
     [[gnu::always_inline]] Value extinction_at(std::size_t k) const {
       if constexpr (C > 1)
-        if (field != &medium) return factors * Value(Pack::load(&state.extinction[k]));
+        if (factors) return *factors * Value(Pack::load(&state.extinction[k]));
       return Value::load(&state.extinction[k * C]);
     }
 

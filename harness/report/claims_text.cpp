@@ -75,8 +75,9 @@ std::string findings_count(const std::vector<ClaimFinding>& all) {
     return std::count_if(all.begin(), all.end(), [&](const ClaimFinding& one) { return one.outcome == outcome; });
   };
   return fmt::format(
-      "{} claims: {} reproduced, {} refuted, {} cannot be told (at most {:g} of all runs show even one false word)", all.size(),
-      of(ClaimOutcome::reproduced), of(ClaimOutcome::refuted), of(ClaimOutcome::cannot_tell), kFindingsLevel);
+      "{} claim{}: {} reproduced, {} refuted, {} cannot be told (at most {:g} of all runs show even one false word)", all.size(),
+      all.size() == 1 ? "" : "s", of(ClaimOutcome::reproduced), of(ClaimOutcome::refuted), of(ClaimOutcome::cannot_tell),
+      kFindingsLevel);
 }
 
 std::string figures_of(const PartFinding& part) {

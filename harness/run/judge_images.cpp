@@ -105,7 +105,7 @@ class PictureJudging {
     // They would be those of means over pixels.
     record_.convergence.clear();
     record_.squared_error_blocks.clear();
-    if (verdict_) decide(*verdict_, record_.outputs);
+    if (verdict_) decide(*verdict_, record_.outputs, record_.range);
     if (record_.status == Status::ok)
       add_verdict(record_, whole_, verdict_);
     else

@@ -15,15 +15,6 @@
 namespace nullmark {
 namespace {
 
-/// A range by its name and its ends.
-std::string told(SampleRange range) {
-  const char* const ends = range == SampleRange::binary         ? ": 0 or 1"
-                           : range == SampleRange::unit         ? ": 0 to 1"
-                           : range == SampleRange::non_negative ? ": at least 0"
-                                                                : "";
-  return std::string(to_string(range)) + ends;
-}
-
 /// Variances from samples of their own, where theory has none; some of them are kept.
 void run_pilot(const PreparedCell& prepared, const std::function<bool()>& stop, DrawnPilot& drawn) {
   const SampleSpan span = pilot_span(prepared);
@@ -173,7 +164,7 @@ class Judging {
       if (plan_.tests[i].channel == MeanTest::kLookups && verdict_.counted_walks > 0)
         verdict_.tests.back().basis = TestBasis::counted;
     }
-    decide(verdict_, prepared_.targets.names, told(prepared_.range));
+    decide(verdict_, prepared_.targets.names, to_string(prepared_.range));
     return verdict_;
   }
 

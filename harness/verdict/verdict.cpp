@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/model/names.h"
+
 namespace nullmark {
 namespace {
 
@@ -118,6 +120,13 @@ struct Found {
   std::vector<const TestRecord*> within;
 };
 
+/// " (unit: 0 to 1)" of a range by its name.
+std::string ends_of(const std::string& range) {
+  if (range == to_string(SampleRange::binary)) return " (binary: 0 or 1)";
+  if (range == to_string(SampleRange::unit)) return " (unit: 0 to 1)";
+  return range == to_string(SampleRange::non_negative) ? " (non_negative: at least 0)" : "";
+}
+
 /// The outcome of the means, with its reason or what it proves.
 void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std::string>& outputs, const std::string& range) {
   Outcome& outcome = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
@@ -136,8 +145,7 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
     verdict.reason = samples_that(verdict.nonfinite, "is", "are") + " not finite";
   } else if (verdict.out_of_range > 0) {
     outcome = Outcome::fail;
-    verdict.reason = samples_that(verdict.out_of_range, "lies", "lie") + " outside the declared range" +
-                     (range.empty() ? "" : " (" + range + ")");
+    verdict.reason = samples_that(verdict.out_of_range, "lies", "lie") + " outside the declared range" + ends_of(range);
     if (found.failed)
       verdict.reason += "; " + place_of(*found.failed, outputs, found.means) + without_proof(*found.failed, alpha, "that range");
   } else if (found.failed) {

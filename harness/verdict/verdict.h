@@ -20,7 +20,8 @@ Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass);
 ///   tolerate nothing   FAIL: a bias is proven.  PASS: every test is within epsilon, and the planned samples were drawn.
 ///   tolerate epsilon   FAIL: a bias beyond epsilon is proven.  PASS: every test is within epsilon.
 ///
-/// Otherwise INCONCLUSIVE.  `outputs` names the tested outputs if they are not channels; `range` tells the declared range.
+/// Otherwise INCONCLUSIVE.  `outputs` names the tested outputs if they are not channels; `range` is the name of the declared
+/// range, for the reason.
 void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs = {}, const std::string& range = {});
 
 /// What a PASS excludes: |mean error| over all rays, relative to the reference; the largest over the tests of means.

@@ -154,7 +154,7 @@ TEST(Verdict, ViolationsAndImpossibleSamplesComeFirst) {
   decide(verdict);
   EXPECT_EQ(verdict.unbiased, Outcome::fail);
   EXPECT_EQ(verdict.reason, "1 sample lies outside the declared range");
-  decide(verdict, {}, "unit: 0 to 1");
+  decide(verdict, {}, "unit");
   EXPECT_EQ(verdict.reason, "1 sample lies outside the declared range (unit: 0 to 1)");
   // What the mean shows stands beside it, so that nobody widens the range and believes the rest.
   VerdictRecord both = verdict_of({failing()});
