@@ -51,8 +51,9 @@ struct UnidirectionalMis {
       const Real v = std::exp(-depth_left), c = v / (1 + v);
       return c * (c + 2 * (std::exp(-tau_left) - v) + 3 * v * c);
     };
-    const Real rest = integral_over_vertices(
-        ray, profile, channel, [&](Real a, Real depth_left, Real tau_left) { return a * a * second(depth_left, tau_left); });
+    const Real rest = integral_over_vertices(ray, profile, channel, [&](Real a, Real depth_left, Real tau_left, Real) {
+      return a * a * second(depth_left, tau_left);
+    });
     theory.variance = std::max<Real>(0, second(total, tau) + rest - std::exp(-2 * tau));
     return theory;
   }

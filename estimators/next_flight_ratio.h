@@ -42,8 +42,8 @@ struct NextFlightRatioTracking {
   Theory theory(const MediumRay<Value>& ray, const RayProfile& profile, int c, Quantity) const {
     Theory theory{.lookups = ray.majorant.total_depth(), .lookups_variance = ray.majorant.total_depth()};
     if (!profile.resolved()) return theory;
-    theory.variance = integral_over_vertices(ray, profile, c, [](Real a, Real depth_left, Real tau_left) {
-      const Real change = std::exp(-depth_left) - (1 - a) * std::exp(-tau_left);
+    theory.variance = integral_over_vertices(ray, profile, c, [](Real a, Real, Real tau_left, Real null_left) {
+      const Real change = std::exp(-tau_left) * (std::expm1(-null_left) + a);
       return change * change;
     });
     return theory;
