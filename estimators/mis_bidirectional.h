@@ -4,7 +4,6 @@
 #include <array>
 #include <limits>
 #include <span>
-#include <type_traits>
 #include <vector>
 
 #include "estimators/estimator.h"

@@ -185,7 +185,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     Counters& counters;
     Rates rates = {}, majorant = Rates(state.ray.majorant);
     std::array<T, 3> origin = narrowed(context.local.origin), direction = narrowed(context.local.direction);
-    /// Those by which a coloured medium multiplies a grey field, which is then looked up.
+    /// The spectrum that multiplies a grey field, where the medium is such a product; the field is then looked up.
     std::conditional_t<(C > 1), std::optional<Value>, std::monostate> factors = {};
 
     static std::array<T, 3> narrowed(const Vec3& v) {

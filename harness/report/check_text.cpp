@@ -65,7 +65,7 @@ std::string reasons_of_untested(const RunRecord& run) {
   return text;
 }
 
-/// At 100 ns a sample, minutes for each ray.
+/// Samples a ray: minutes of CPU for each ray at 100 ns a sample.
 constexpr std::uint64_t kMostAdvised = 1'000'000'000;
 
 /// What keeps a run whose cells are good from being a success, and what was left out on purpose.
