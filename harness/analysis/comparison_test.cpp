@@ -53,6 +53,10 @@ TEST(Cost, AVarianceThatRareSamplesDecideIsUncertain) {
   channel.bias = -1e-9;  // all samples were 0
   channel.reference = channel.reference_rms = 1e-9;
   EXPECT_TRUE(variance_is_uncertain(record, channel));
+  // Of a bias that is proven no unseen sample is to blame.
+  record.verdict.emplace().biased = true;
+  EXPECT_FALSE(variance_is_uncertain(record, channel));
+  record.verdict.reset();
   EXPECT_GT(cost_of(record)->variance.high / cost_of(record)->variance.value, 40);
   channel.bias = 1e-11;
   EXPECT_FALSE(variance_is_uncertain(record, channel));

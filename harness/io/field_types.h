@@ -178,17 +178,22 @@ struct PositiveField {
 template <class T>
 PositiveField(T&) -> PositiveField<T>;
 
-/// A probability: above 0 and below 1.
+/// A number above 0 and below 1, or nothing where the member is an optional.
+template <class T>
 struct LevelField {
-  Real& value;
+  T& value;
 
+  bool empty() const { return value == T{}; }
   Json json() const { return number_or_null(value); }
   void read(const JsonNode& node) const {
-    value = node.number();
-    if (!(value > 0 && value < 1)) node.expected("a number between 0 and 1");
+    const Real number = node.number();
+    if (!(number > 0 && number < 1)) node.expected("a number between 0 and 1");
+    value = number;
   }
   Json schema() const { return {{"type", "number"}, {"exclusiveMinimum", 0}, {"exclusiveMaximum", 1}}; }
 };
+template <class T>
+LevelField(T&) -> LevelField<T>;
 
 /// One of a list of words.
 struct WordField {

@@ -72,7 +72,7 @@ void visit_fields(Visit& visit, VerdictSpec& spec) {
   visit.sparse("samples", FlagWordField{spec.all_samples, sample_policies(), "policy"},
                "planned: an undecided cell draws no more if the plan says that its allowance does not suffice; all: it draws its "
                "whole allowance");
-  visit.sparse("epsilon", PositiveField{spec.epsilon}, "a PASS proves |bias| below this; relative to the mean reference");
+  visit.sparse("epsilon", LevelField{spec.epsilon}, "a PASS proves |bias| below this; relative to the mean reference");
   visit.sparse("max_lookups_per_ray", PositiveField{spec.max_lookups_per_ray},
                "expected lookups that all samples of a ray may cost");
 }

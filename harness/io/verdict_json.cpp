@@ -57,6 +57,7 @@ void visit_fields(Visit& visit, TestRecord& test) {
   if (Visit::kDescribes || test.deterministic()) {
     visit.lenient("largest_error", error(test.largest_error), "of single samples, where they are deterministic");
     visit.lenient("rounding", figure(test.rounding));
+    visit.sparse("log_e_fail", test.log_e_fail, "against \"mean error 0\", where a sample is off by more than rounding");
   }
   if (!test.deterministic()) {
     visit.part("log_e", [&](auto& inner) {
@@ -152,7 +153,11 @@ struct TestsField {
     for (const JsonNode& element : node.elements()) {
       TestRecord test = unproven_test();
       read_fields(element, test);
-      if (test.deterministic()) test.log_e_fail = test.log_e_low = test.log_e_high = test.log_e_beyond = 0;
+      if (test.deterministic()) {
+        const bool right = test.largest_error <= test.rounding + test.reference_error;
+        if (!element.has("log_e_fail")) test.log_e_fail = right ? 0 : kCertain;
+        test.log_e_low = test.log_e_high = test.log_e_beyond = 0;
+      }
       const int channel = test.channel;
       tests.push_back(std::move(test));
       if (element.has("groups")) read_groups(element["groups"], channel, tests);

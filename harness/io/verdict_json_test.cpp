@@ -31,6 +31,8 @@ TEST(VerdictJson, ComesBackAndIsDecidedTheSame) {
   mixed[5].epsilon = 0.04;
   mixed.push_back(passing(1));
   mixed.push_back(failing(-1));
+  TestRecord off_a_bit = deterministic(2e-7);
+  off_a_bit.log_e_fail = 3.5;
   TestRecord no_evidence = passing();
   no_evidence.log_e_low = -kInfinity;
   VerdictRecord violated = verdict_of({failing()});
@@ -41,9 +43,10 @@ TEST(VerdictJson, ComesBackAndIsDecidedTheSame) {
   broken.nonfinite = 3;
   broken.out_of_range = 5;
   broken.family = 9007199254740993;
-  for (VerdictRecord verdict : {verdict_of({passing()}), verdict_of({open_one(), passing(-1)}), verdict_of({failing()}),
-                                verdict_of({deterministic(0)}), verdict_of({deterministic(kInfinity)}), verdict_of(grouped),
-                                verdict_of(mixed), verdict_of({no_evidence}), violated, own, broken, verdict_of({})}) {
+  for (VerdictRecord verdict :
+       {verdict_of({passing()}), verdict_of({open_one(), passing(-1)}), verdict_of({failing()}), verdict_of({deterministic(0)}),
+        verdict_of({off_a_bit}), verdict_of({deterministic(kInfinity)}), verdict_of(grouped), verdict_of(mixed),
+        verdict_of({no_evidence}), violated, own, broken, verdict_of({})}) {
     decide(verdict);
     VerdictRecord back = read_back(verdict);
     EXPECT_EQ(verdict_json(back), verdict_json(verdict));

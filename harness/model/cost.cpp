@@ -49,7 +49,9 @@ bool variance_is_uncertain(const CellRecord& record, const ChannelRecord& channe
   if (channel.variance_theory || !channel.variance || record.samples == 0) return false;
   const auto samples = static_cast<Real>(record.samples);
   if (channel.kurtosis && std::sqrt(std::max<Real>(0, *channel.kurtosis - 1) / samples) > 0.5) return true;
-  if (record.claims != "unbiased" || !stands_unbiased(record) || !channel.bias) return false;
+  // A bias that is proven needs no unseen samples, even where the verdict tolerates it.
+  const bool biased = record.verdict && record.verdict->biased;
+  if (record.claims != "unbiased" || !stands_unbiased(record) || biased || !channel.bias) return false;
   const Real rounding = kRounding * channel.reference_rms.value_or(0) + channel.reference_error.value_or(0);
   return std::abs(*channel.bias) > 5 * std::sqrt(*channel.variance / samples) + rounding;
 }

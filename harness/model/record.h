@@ -64,6 +64,9 @@ struct TimeRecord {
 /// or nothing was tested.
 enum class Outcome : std::uint8_t { none, pass, fail, inconclusive, violated };
 
+/// Evidence of a contradiction that no chance explains.
+inline constexpr Real kCertain = 1e6;
+
 /// Evidence of one test, from which `check` derives its outcome.
 struct TestRecord {
   int channel = 0;  ///< -1: lookups

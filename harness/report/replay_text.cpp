@@ -115,7 +115,8 @@ std::string replay_text(const Replay& replay) {
   text +=
       fmt::format("{}, ray {}, sample {}\nfrom {} along {}, distances {:.9g} to {:.9g}\n", replay.cell, replay.ray, replay.sample,
                   point(replay.world.origin), point(replay.world.direction), replay.world.begin, replay.world.end);
-  text += fmt::format("{} lookups, {} random numbers\n\n", replay.lookups, replay.draws.size());
+  text += fmt::format("{} lookup{}, {} random number{}\n\n", replay.lookups, replay.lookups == 1 ? "" : "s", replay.draws.size(),
+                      replay.draws.size() == 1 ? "" : "s");
   if (replay.walk.steps.empty() && replay.lookups > 0) return text + fmt::format("random numbers {}\n", words(replay.draws));
   return text + steps_text(replay);
 }

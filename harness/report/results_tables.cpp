@@ -51,10 +51,11 @@ std::string shown(const ChannelRecord& channel, const std::optional<Real>& value
   return heavy_tailed(channel) && theory ? short_number(theory) + "*" : short_number(value);
 }
 
-/// The status, and what stands beside the verdict's word: what a PASS proves, or the reason of any other word.
+/// What stands beside the verdict's word: what a PASS proves, or the reason of any other word.  The status where there is none.
 std::string status_of(const CellRecord& record) {
   const std::string status = to_string(record.status), finding = finding_of(record);
-  return finding.empty() || finding == status ? status : status + (record.status == Status::ok ? ", " : ": ") + finding;
+  if (finding.empty()) return status;
+  return record.status == Status::ok || finding == status ? finding : status + ": " + finding;
 }
 
 std::string output_name(const CellRecord& record, std::size_t c) {

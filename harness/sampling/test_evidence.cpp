@@ -41,7 +41,12 @@ TestRecord test_record(const MeanTest& test, const Evidence& evidence) {
   record.largest_error = evidence.largest_error;
   record.rounding = test.rounding;
   record.planned = test.planned;
-  if (test.deterministic) return record;
+  const bool right = record.largest_error <= record.rounding + record.reference_error;
+  if (test.deterministic && right) return record;
+  if (test.deterministic && !(record.largest_error <= test.certainly_biased)) {
+    record.log_e_fail = kCertain;
+    return record;
+  }
 
   // By role and kind: kinds weigh the same, however many rates each has.
   std::map<std::pair<Role, Bet::Kind>, std::vector<Real>> wealth;
@@ -63,6 +68,7 @@ TestRecord test_record(const MeanTest& test, const Evidence& evidence) {
     return std::round(log_mean_exp(kinds) * kDigits) / kDigits;
   };
   record.log_e_fail = log_e(Role::fail);
+  if (test.deterministic) return record;
   record.log_e_low = log_e(Role::low);
   record.log_e_high = log_e(Role::high);
   record.log_e_beyond = log_e(Role::beyond);

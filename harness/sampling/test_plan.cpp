@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
+#include <iterator>
 
 #include "harness/kernel/given_samples.h"
 #include "harness/sampling/margins.h"
@@ -17,6 +18,10 @@ constexpr Real kNoBias = 1e-9;
 
 /// Where the standard deviation is a millionth of rounding, no sample in 10^12 shows it, whatever its law [Chebyshev].
 constexpr Real kSurely = 1e-12;
+
+/// Of the squared mean, what theory may be wrong by where it states no variance: E[X^2] - T^2 has no more digits than E[X^2].
+/// Then an error of a hundredth of the mean comes once in 10^8 samples [Chebyshev].
+constexpr Real kStatedDigits = 1e-12, kNoNoise = 1e-2;
 
 /// A pilot variance is trusted for unbounded samples only below this variance of the variance.
 constexpr Real kTrustedVariance = 0.02;
@@ -216,6 +221,7 @@ class TestPlanner {
       // Far below epsilon a variance decides nothing, and theory's may be rounding.
       if (!test.deterministic) test.variance = std::max(test.variance, test.epsilon * test.epsilon / 4);
       place(test, {pool.most - plan_.low, plan_.high - pool.least, test.variance, basis(), test.reference_error});
+      if (test.deterministic) doubt(test, pool);
       demand(test, pool);
       plan_.tests.push_back(std::move(test));
     }
@@ -241,6 +247,18 @@ class TestPlanner {
     test.planned = needed(kPlannedPower);
     // The chance that all tests are decided is no less than 1 minus the sum of the others.
     test.sure = needed(boost::math::quantile(complement(boost::math::normal(), kUnsure / static_cast<Real>(levels_.tests))));
+  }
+
+  /// Bets on samples that are off although theory states no variance.  A tracker that is exact needs no theory.
+  void doubt(MeanTest& test, const Pool& pool) const {
+    test.certainly_biased = test.rounding + test.reference_error;
+    if (exact_) return;
+    test.certainly_biased = std::max(test.certainly_biased, kNoNoise * pool.largest);
+    const Real variance = std::max({kStatedDigits * pool.largest * pool.largest, test.rounding * test.rounding, 1e-300});
+    const ErrorLaw law{.variance = variance, .reference_error = test.reference_error};
+    const auto bets = place_bets(law, 2 * std::sqrt(variance), cell_.samples_per_ray * test.rays, 1);
+    std::copy_if(bets.begin(), bets.end(), std::back_inserter(test.bets),
+                 [](const auto& bet) { return bet.first == Role::fail; });
   }
 
   /// "2000 samples a ray, 272 of them the pilot's": whoever hands samples in counts the pilot's as well.

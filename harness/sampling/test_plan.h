@@ -35,11 +35,12 @@ struct MeanTest {
   Real reference_error = 0;    ///< absolute, of the reference
   Real variance = 0;           ///< per sample, averaged over the rays, from theory or a pilot
   Real rounding = 0;           ///< errors up to here are rounding
-  bool deterministic = false;  ///< no variance beyond rounding: every single sample must be right
+  bool deterministic = false;  ///< no variance beyond rounding: every single sample should be right
+  Real certainly_biased = 0;   ///< deterministic: a sample that is off by more proves a bias; smaller errors are bet on
   TestBasis basis = TestBasis::none;
-  Real reference = 0;          ///< expected mean, averaged over the rays
-  std::uint64_t planned = 0;   ///< samples per ray at which the test of an unbiased mean passes with a chance of .95
-  std::uint64_t sure = 0;      ///< the same, if all tests of the configuration together pass with a chance of .999
+  Real reference = 0;         ///< expected mean, averaged over the rays
+  std::uint64_t planned = 0;  ///< samples per ray at which the test of an unbiased mean passes with a chance of .95
+  std::uint64_t sure = 0;     ///< the same, if all tests of the configuration together pass with a chance of .999
   std::vector<std::pair<Role, Bet>> bets;
   std::vector<int> sum_lengths = {1};  ///< errors per sum, ascending: powers of two that divide the samples of a ray
 

@@ -37,7 +37,7 @@ class Trial {
       const Law& law = subject_.rays[ray];
       const Real mean = subject_.claimed.empty() ? law.mean() : subject_.claimed[ray];
       for (Real& error : errors_) {
-        error = subject_.constant ? mean * (rng_.uniform() - 0.5) * 1e-15 : law.draw(rng_) - mean;
+        error = subject_.spread > 0 ? mean * (2 * rng_.uniform() - 1) * subject_.spread : law.draw(rng_) - mean;
         total_ += error;
         squares_ += error * error;
         largest = std::max(largest, std::abs(error));
@@ -45,10 +45,8 @@ class Trial {
       for (std::size_t i = 0; i < test_plan_.tests.size(); ++i) {
         const MeanTest& test = test_plan_.tests[i];
         if (test.group != MeanTest::kAllRays && test.group != test_plan_.group_of[ray]) continue;
-        if (test.deterministic)
-          evidence_[i].largest_error = std::max(evidence_[i].largest_error, largest);
-        else
-          add(evidence_[i], test);
+        if (test.deterministic) evidence_[i].largest_error = std::max(evidence_[i].largest_error, largest);
+        add(evidence_[i], test);
       }
     }
     samples_ += count;
@@ -75,7 +73,7 @@ class Trial {
   Real naive_p() const {
     const auto n = static_cast<Real>(samples_ * subject_.rays.size());
     const Real variance = (squares_ - total_ * total_ / n) / (n - 1);
-    return variance > 0 && !subject_.constant ? std::erfc(std::abs(total_) / std::sqrt(2 * n * variance)) : 1;
+    return variance > 0 ? std::erfc(std::abs(total_) / std::sqrt(2 * n * variance)) : 1;
   }
 
   std::uint64_t samples() const { return samples_; }
@@ -174,7 +172,8 @@ std::vector<Entry> unbiased_cells() {
     if (named.range != SampleRange::binary && named.law.relative_variance() < 60)
       sweep.push_back({{{named.law}, SampleRange::any_sign, margin_for(named.law, kLastLook)}, true});
   }
-  sweep.push_back({{{coin(0.5)}, SampleRange::unit, {}, {}, false, true}});
+  constexpr Real kRoundingOnly = 5e-16;
+  sweep.push_back({{{coin(0.5)}, SampleRange::unit, {}, {}, false, kRoundingOnly}});
   // Rays of different means share the pooled bet, and are judged in groups as well.
   for (const SampleRange range : {SampleRange::unit, SampleRange::any_sign}) {
     Subject rays;
@@ -183,6 +182,10 @@ std::vector<Entry> unbiased_cells() {
     for (int i = 0; i < 16; ++i) rays.rays.push_back(i % 2 ? coin(0.05 * (i + 2)) : ratio(0.2 * (i + 1)));
     sweep.push_back({rays});
   }
+  // Theory that cancels to 0, up to where the variance is 1e-12 of the squared mean.
+  for (const Real spread : {1e-9, 1e-7, std::sqrt(3.) * 1e-6})
+    for (const SampleRange range : {SampleRange::unit, SampleRange::any_sign})
+      sweep.push_back({{{coin(0.5)}, range, {}, {}, false, spread}});
   return sweep;
 }
 

@@ -124,7 +124,7 @@ struct Subject {
   std::optional<Real> epsilon{};
   std::vector<Real> claimed{};  ///< means; empty: the right ones
   bool lookups = false;         ///< the samples are counts of lookups
-  bool constant = false;        ///< every sample is the mean but for its last digits
+  Real spread = 0;  ///< if positive: samples are uniform within the mean times 1 +- this, and theory states no variance
 };
 
 inline TestPlan test_plan_of(const Subject& subject, std::uint64_t samples_per_ray, const std::optional<Pilot>& pilot = {}) {
@@ -145,7 +145,7 @@ inline TestPlan test_plan_of(const Subject& subject, std::uint64_t samples_per_r
     targets.mean.push_back(subject.lookups ? 0.5 : mean);
     targets.error.push_back(targets.mean.back() * 1e-12);
     theory.ray_shift.push_back(0);
-    if (!pilot) theory.ray_variance.push_back(subject.constant ? 0 : subject.lookups ? 0.25 : law.variance());
+    if (!pilot) theory.ray_variance.push_back(subject.spread > 0 ? 0 : subject.lookups ? 0.25 : law.variance());
     if (!subject.lookups) continue;
     theory.ray_lookups.push_back(law.mean());
     theory.ray_lookups_variance.push_back(law.variance());

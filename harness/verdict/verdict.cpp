@@ -13,13 +13,17 @@ namespace {
 /// The reference's own error may take so much of epsilon where a PASS is to be had.
 constexpr Real kReferenceShare = 0.25;
 
-std::string place_of(const TestRecord& test, const std::vector<std::string>& outputs, std::size_t tests) {
+/// "channel 2, ray group 5: ", as far as there is a choice.
+std::string place_of(const TestRecord& test, const std::vector<std::string>& outputs, bool one_channel) {
   if (test.channel < 0) return "lookups: ";
-  if (tests == 1 && test.group < 0) return "";
   const auto output = static_cast<std::size_t>(test.channel);
-  const std::string text = output < outputs.size() ? outputs[output] : fmt::format("channel {}", test.channel);
-  return test.group < 0 ? text + ": " : fmt::format("{}, ray group {}: ", text, test.group);
+  std::string place = one_channel ? "" : output < outputs.size() ? outputs[output] : fmt::format("channel {}", test.channel);
+  if (test.group >= 0) place += fmt::format("{}ray group {}", place.empty() ? "" : ", ", test.group);
+  return place.empty() ? "" : place + ": ";
 }
+
+/// The most that a sample without variance may be off by.
+Real rounding_of(const TestRecord& test) { return test.rounding + test.reference_error; }
 
 /// A mean error as a share of the reference, or itself where there is nothing to share.
 std::string as_share(Real error, Real reference) {
@@ -56,10 +60,11 @@ std::string without_proof(const TestRecord& test, Real alpha, const char* claim)
 }
 
 std::string failure(const TestRecord& test, const Proof& proof, Real alpha, const VerdictRecord& verdict) {
-  if (test.deterministic())
-    return fmt::format("a sample is off by {:.3g}, rounding allows {:.3g}; {}", test.largest_error,
-                       test.rounding + test.reference_error, measured_bias(test));
   const Real needed = -std::log(alpha);
+  if (test.deterministic())
+    return fmt::format(
+        "a sample is off by {:.3g}, rounding allows {:.3g}; {}{}", test.largest_error, rounding_of(test), measured_bias(test),
+        test.log_e_fail < kCertain ? fmt::format("; biased, proven (log E {:.1f} > {:.1f})", test.log_e_fail, needed) : "");
   if (verdict.against == "difference")
     return fmt::format("the means differ by {:+.3g}, proven (log E {:.1f} > {:.1f})", test.mean_error,
                        std::max(test.log_e_fail, test.log_e_beyond), needed);
@@ -72,7 +77,9 @@ std::string failure(const TestRecord& test, const Proof& proof, Real alpha, cons
 }
 
 /// The error that a test excludes where it is within.
-Real margin_of(const TestRecord& test) { return test.deterministic() ? test.rounding + test.reference_error : test.epsilon; }
+Real margin_of(const TestRecord& test) {
+  return test.deterministic() ? std::max(rounding_of(test), test.largest_error) : test.epsilon;
+}
 
 /// The test that PASS says least of, relative to its reference; `error` is what is small.
 std::string within_text(const std::vector<const TestRecord*>& tests, const char* error) {
@@ -99,13 +106,14 @@ void decide_laws(VerdictRecord& verdict) {
 }  // namespace
 
 Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
-  if (test.deterministic()) {
-    const bool right = test.largest_error <= test.rounding + test.reference_error;
-    const bool far = !right && std::abs(test.mean_error) > test.epsilon + test.rounding + test.reference_error;
-    return {.biased = !right, .beyond = far, .within = right && test.reference_error <= kReferenceShare * test.epsilon};
-  }
   const Real to_fail = -std::log(alpha_fail), to_pass = -std::log(alpha_pass);
   const bool precise = test.reference_error <= kReferenceShare * test.epsilon;
+  if (test.deterministic()) {
+    const bool right = test.largest_error <= rounding_of(test), biased = !right && test.log_e_fail >= to_fail;
+    return {.biased = biased,
+            .beyond = biased && std::abs(test.mean_error) > test.epsilon + rounding_of(test),
+            .within = precise && (right || test.largest_error <= test.epsilon)};
+  }
   return {.biased = test.log_e_fail >= to_fail,
           .beyond = test.log_e_beyond >= to_fail,
           .within = precise && (test.basis == TestBasis::counted || (test.log_e_low >= to_pass && test.log_e_high >= to_pass))};
@@ -132,8 +140,11 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
   Outcome& outcome = verdict.against == "own mean" ? verdict.own_mean : verdict.unbiased;
   const Real alpha = verdict.alpha / static_cast<Real>(verdict.family);
   const bool drawn_as_planned = verdict.tolerate == Tolerate::epsilon || verdict.samples_per_ray >= verdict.planned;
+  const bool one_channel = std::none_of(verdict.tests.begin(), verdict.tests.end(), [&](const TestRecord& test) {
+    return test.channel >= 0 && test.channel != verdict.tests.front().channel;
+  });
   const auto reason = [&](const TestRecord& test, const std::string& text) {
-    verdict.reason = place_of(test, outputs, found.means) + text;
+    verdict.reason = place_of(test, outputs, one_channel) + text;
   };
   if (found.means == 0) {
     outcome = Outcome::none;
@@ -147,7 +158,7 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
     outcome = Outcome::fail;
     verdict.reason = samples_that(verdict.out_of_range, "lies", "lie") + " outside the declared range" + ends_of(range);
     if (found.failed)
-      verdict.reason += "; " + place_of(*found.failed, outputs, found.means) + without_proof(*found.failed, alpha, "that range");
+      verdict.reason += "; " + place_of(*found.failed, outputs, one_channel) + without_proof(*found.failed, alpha, "that range");
   } else if (found.failed) {
     outcome = Outcome::fail;
     reason(*found.failed, failure(*found.failed, proven(*found.failed, alpha, verdict.alpha_pass), alpha, verdict));

@@ -73,11 +73,27 @@ TEST(Verdict, WithoutVarianceEverySampleMustBeRight) {
   test.largest_error = test.rounding + test.reference_error;
   EXPECT_EQ(decide(test, kAlpha, kAlphaPass), Outcome::pass);
   test.largest_error = std::nextafter(test.largest_error, 1);
+  test.log_e_fail = kCertain;
   EXPECT_EQ(decide(test, kAlpha, kAlphaPass), Outcome::fail);
-  // Bets were not placed, so they say nothing.
   test.largest_error = 0;
-  test.log_e_fail = 1000;
   EXPECT_EQ(decide(test, kAlpha, kAlphaPass), Outcome::pass);
+}
+
+/// What theory calls no variance may be a small one.
+TEST(Verdict, SamplesThatAreOffABitNeedEvidence) {
+  TestRecord test = deterministic(0.009);
+  EXPECT_EQ(decide(test, kAlpha, kAlphaPass), Outcome::fail);
+  test.log_e_fail = just_below(-std::log(kAlpha));
+  EXPECT_EQ(decide(test, kAlpha, kAlphaPass), Outcome::pass);
+  VerdictRecord verdict = verdict_of({test});
+  verdict.tests[0].reference = 1;
+  decide(verdict);
+  EXPECT_EQ(verdict.proves, "|bias| < 0.9 % of the mean");
+  verdict.tests[0].log_e_fail = 100;
+  decide(verdict);
+  EXPECT_NE(verdict.reason.find("biased, proven (log E 100.0 > 9.2)"), std::string::npos) << verdict.reason;
+  test.largest_error = 0.011;
+  EXPECT_EQ(decide(test, kAlpha, kAlphaPass), Outcome::inconclusive);
 }
 
 TEST(Verdict, LevelsAreSharedOutOverTheFamily) {
@@ -114,7 +130,11 @@ TEST(Verdict, TheWorstTestDecides) {
   VerdictRecord verdict = verdict_of({passing(), group});
   decide(verdict);
   EXPECT_EQ(verdict.unbiased, Outcome::fail);
-  EXPECT_NE(verdict.reason.find("ray group 7"), std::string::npos) << verdict.reason;
+  EXPECT_EQ(verdict.reason.find("ray group 7: "), 0u) << verdict.reason;
+  group.channel = 1;
+  verdict = verdict_of({passing(), passing(1), group});
+  decide(verdict);
+  EXPECT_EQ(verdict.reason.find("channel 1, ray group 7: "), 0u) << verdict.reason;
 }
 
 TEST(Verdict, ReasonsAreGivenAndForgotten) {

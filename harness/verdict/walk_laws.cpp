@@ -296,10 +296,7 @@ std::optional<LawRecord> segments_law(const Cell& cell, const Scene& scene, cons
   for (std::size_t i = 0; i < plan.tests.size(); ++i) {
     if (plan.tests[i].channel == MeanTest::kLookups) continue;
     const TestRecord record = test_record(plan.tests[i], sampled->evidence[i]);
-    if (plan.tests[i].deterministic)
-      logs.push_back(record.largest_error > record.rounding + record.reference_error ? kCertain : 0);
-    else
-      logs.push_back(record.log_e_fail);
+    logs.push_back(record.log_e_fail);
   }
   return LawRecord{"segments", std::round(log_mean_exp(logs) * 1e4) / 1e4, samples * pieces.rays->world.size(), Outcome::none};
 }

@@ -10,9 +10,6 @@
 
 namespace nullmark {
 
-/// Evidence of a deterministic contradiction: no chance explains it.
-inline constexpr Real kCertain = 1e6;
-
 /// Tests properties of walks other than their mean, for optical depths at which no affordable number of samples decides a mean.
 /// Walks are drawn by the kernel of the cell, with their own streams, and recorded.
 ///
@@ -31,15 +28,15 @@ inline constexpr Real kCertain = 1e6;
 /// Depths are those of the majorant.  Flights that are rewound at the ends of cells follow the same laws: if an exponential is
 /// cut at a depth and drawn anew from there, the collisions are still a Poisson process of rate 1 in depth.
 ///
-/// Returns log E (or -log p) of each law that applies; a law that holds exceeds log(1/a) with probability at most a.  Nothing where
-/// walks take more lookups than a recording holds, or the run stops.
+/// Returns log E (or -log p) of each law that applies; a law that holds exceeds log(1/a) with probability at most a.  Nothing
+/// where walks take more lookups than a recording holds, or the run stops.
 struct LawBudget {
   Real lookups = 2e5;                 ///< approximate total over all walks
   std::uint64_t most_per_ray = 4096;  ///< samples
   Real each = 1;                      ///< lookups per sample, if theory does not state them
 };
-std::optional<std::vector<LawRecord>> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel, const Targets& targets,
-                                                SampleRange range, const CellTheory& theory, const LawBudget& budget,
-                                                const std::function<bool()>& stop);
+std::optional<std::vector<LawRecord>> test_laws(const Cell& cell, const Scene& scene, const Kernel& kernel,
+                                                const Targets& targets, SampleRange range, const CellTheory& theory,
+                                                const LawBudget& budget, const std::function<bool()>& stop);
 
 }  // namespace nullmark
