@@ -111,8 +111,10 @@ const CellRecord& record_of(const RunRecord& run, const std::string& file, const
 std::size_t place_of(const Plan& plan, const std::string& file, const Cell& cell) {
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
     if (plan.cells[i].name == cell.name && plan.cells[i].id == cell.id) return i;
-  throw InputError(
-      fmt::format("{}: the configuration in it does not hold \"{}\" as it was sampled; run it again", file, cell.name));
+  throw InputError(fmt::format(
+      "{}: this program makes no cell \"{}\" as it was sampled of the configuration in it: it, or the parameters of its "
+      "tracker, have changed; run it again",
+      file, cell.name));
 }
 
 /// As many as its verdict took; none of a cell that was not sampled.

@@ -20,8 +20,8 @@ constexpr Real kNoBias = 1e-9;
 constexpr Real kSurely = 1e-12;
 
 /// Of the squared mean, what theory may be wrong by where it states no variance: E[X^2] - T^2 has no more digits than E[X^2].
-/// Then an error of a hundredth of the mean comes once in 10^8 samples [Chebyshev].
-constexpr Real kStatedDigits = 1e-12, kNoNoise = 1e-2;
+/// Then an error of a thousandth of the mean comes at most once in 10^6 samples [Chebyshev].
+constexpr Real kStatedDigits = 1e-12, kNoNoise = 1e-3;
 
 /// A pilot variance is trusted for unbounded samples only below this variance of the variance.
 constexpr Real kTrustedVariance = 0.02;

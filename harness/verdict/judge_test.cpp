@@ -55,6 +55,15 @@ TEST(Judging, ToleratingEpsilonIsNeverWrong) {
   }
 }
 
+/// It has no flights that could depend on each other.
+TEST(Judging, ATrackerThatTakesNoFlightBreaksNoLawOfThem) {
+  const auto records = run_on_a_line(
+      R"("samples_per_ray":1024,"verdict":{"laws":"always"},"matrix":{"estimator":"planted_reference","medium":{"type":"linear"},
+          "majorant":{"type":"global","looseness":2}})");
+  for (const LawRecord& law : first_verdict(records).laws)
+    EXPECT_FALSE(law.name == "independence" && law.outcome == Outcome::fail) << law.log_e;
+}
+
 /// Walks of 2e6 lookups where theory states fewer than 100: their record would not fit memory.
 TEST(Judging, WalksThatOutgrowARecordingAreSaidToBeUntested) {
   const auto records = run_on_a_line(R"("samples_per_ray":2,"verdict":{"laws":"always","max_samples_per_ray":2},

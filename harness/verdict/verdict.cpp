@@ -52,6 +52,13 @@ std::string samples_that(std::size_t count, const char* one, const char* many) {
   return count == 1 ? fmt::format("1 sample {}", one) : fmt::format("{} samples {}", count, many);
 }
 
+/// What a sample of a deterministic test that is not right shows.
+std::string off(const TestRecord& test, const VerdictRecord& verdict) {
+  return fmt::format("a sample is off by {:.3g}, rounding allows {:.3g}; {}{}", test.largest_error, rounding_of(test),
+                     measured_bias(test),
+                     verdict.variance_basis == "analytic" ? "; biased, or theory() is wrong to state a variance of 0" : "");
+}
+
 /// What a failed test shows where its evidence rests on a claim of the tracker that is false: the bets need not be fair.
 std::string without_proof(const TestRecord& test, Real alpha, const char* claim) {
   if (test.deterministic()) return measured_bias(test);
@@ -61,10 +68,7 @@ std::string without_proof(const TestRecord& test, Real alpha, const char* claim)
 
 std::string failure(const TestRecord& test, const Proof& proof, Real alpha, const VerdictRecord& verdict) {
   const Real needed = -std::log(alpha);
-  if (test.deterministic())
-    return fmt::format(
-        "a sample is off by {:.3g}, rounding allows {:.3g}; {}{}", test.largest_error, rounding_of(test), measured_bias(test),
-        test.log_e_fail < kCertain ? fmt::format("; biased, proven (log E {:.1f} > {:.1f})", test.log_e_fail, needed) : "");
+  if (test.deterministic()) return off(test, verdict);
   if (verdict.against == "difference")
     return fmt::format("the means differ by {:+.3g}, proven (log E {:.1f} > {:.1f})", test.mean_error,
                        std::max(test.log_e_fail, test.log_e_beyond), needed);
@@ -165,7 +169,10 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
   } else if (found.open || !drawn_as_planned) {
     outcome = Outcome::inconclusive;
     // What the plan knew beforehand says more.
-    if (verdict.reason.empty() && found.open)
+    if (verdict.reason.empty() && found.open && found.open->deterministic() &&
+        found.open->largest_error > rounding_of(*found.open))
+      reason(*found.open, off(*found.open, verdict));
+    else if (verdict.reason.empty() && found.open)
       reason(*found.open,
              fmt::format("undecided after {} samples a ray; {} were planned", verdict.samples_per_ray, verdict.planned));
     else if (verdict.reason.empty())
@@ -179,7 +186,8 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
                         : verdict.against == "difference" ? "|difference of the means|"
                                                           : "|bias|";
     verdict.proves = within_text(found.within, error);
-    if (found.slightly) verdict.proves += fmt::format("; biased by less: {}", measured_bias(*found.slightly));
+    if (found.slightly)
+      verdict.proves += "; a bias is proven: " + place_of(*found.slightly, outputs, one_channel) + measured_bias(*found.slightly);
   }
 }
 

@@ -91,9 +91,16 @@ TEST(Verdict, SamplesThatAreOffABitNeedEvidence) {
   EXPECT_EQ(verdict.proves, "|bias| < 0.9 % of the mean");
   verdict.tests[0].log_e_fail = 100;
   decide(verdict);
-  EXPECT_NE(verdict.reason.find("biased, proven (log E 100.0 > 9.2)"), std::string::npos) << verdict.reason;
+  EXPECT_NE(verdict.reason.find("a sample is off by 0.009, "), std::string::npos) << verdict.reason;
+  EXPECT_NE(verdict.reason.find("biased, or theory() is wrong to state a variance of 0"), std::string::npos) << verdict.reason;
+  verdict.variance_basis = "none";
+  decide(verdict);
+  EXPECT_EQ(verdict.reason.find("theory()"), std::string::npos) << verdict.reason;
   test.largest_error = 0.011;
   EXPECT_EQ(decide(test, kAlpha, kAlphaPass), Outcome::inconclusive);
+  verdict = verdict_of({test});
+  decide(verdict);
+  EXPECT_NE(verdict.reason.find("a sample is off by 0.011, "), std::string::npos) << verdict.reason;
 }
 
 TEST(Verdict, LevelsAreSharedOutOverTheFamily) {

@@ -105,7 +105,8 @@ class LawTester {
       add("first", uniformity(first_), first_.size());
       if (!ended_early_) add("positions", uniformity(all_), all_.size());
       if (mapped_ > 0) add("mapping", badly_mapped_ ? kCertain : 0, mapped_);
-      add("independence", log_mean_exp(std::vector{serial_.log(), across_.log()}), pairs_);
+      // Walks that all ended before their first flight have none to compare.
+      if (flown_ > 0) add("independence", log_mean_exp(std::vector{serial_.log(), across_.log()}), pairs_);
     }
     add("conditional", conditional(), conditional_count_);
     return records;
