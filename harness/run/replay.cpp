@@ -112,8 +112,8 @@ std::size_t place_of(const Plan& plan, const std::string& file, const Cell& cell
   for (std::size_t i = 0; i < plan.cells.size(); ++i)
     if (plan.cells[i].name == cell.name && plan.cells[i].id == cell.id) return i;
   throw InputError(fmt::format(
-      "{}: this program makes no cell \"{}\" as it was sampled of the configuration in it: it, or the parameters of its "
-      "tracker, have changed; run it again",
+      "{}: the configuration in it no longer gives the cell \"{}\" as it was sampled: it, or the parameters of its tracker, "
+      "have changed; run it again",
       file, cell.name));
 }
 

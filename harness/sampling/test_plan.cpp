@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
-#include <iterator>
 
 #include "harness/kernel/given_samples.h"
 #include "harness/sampling/margins.h"
@@ -65,17 +64,12 @@ std::vector<int> ray_groups(const BuiltRays& rays) {
   const std::size_t n = rays.world.size();
   std::vector<int> groups(n, 0);
   if (n < static_cast<std::size_t>(kRayGroups)) return groups;
-  constexpr int kTiles = 4;
+  constexpr std::size_t kTiles = 4;
   static_assert(kTiles * kTiles == kRayGroups);
-  const bool tiles = rays.width >= kTiles && rays.height >= kTiles;
-  for (std::size_t r = 0; r < n; ++r) {
-    if (tiles) {
-      const auto width = static_cast<std::size_t>(rays.width), height = static_cast<std::size_t>(rays.height);
-      groups[r] = static_cast<int>((r / width) * kTiles / height * kTiles + (r % width) * kTiles / width);
-    } else {
-      groups[r] = static_cast<int>(r * kRayGroups / n);
-    }
-  }
+  const auto width = static_cast<std::size_t>(rays.width), height = static_cast<std::size_t>(rays.height);
+  const bool tiles = width >= kTiles && height >= kTiles;
+  for (std::size_t r = 0; r < n; ++r)
+    groups[r] = static_cast<int>(tiles ? r / width * kTiles / height * kTiles + r % width * kTiles / width : r * kRayGroups / n);
   return groups;
 }
 
@@ -251,14 +245,12 @@ class TestPlanner {
 
   /// Bets on samples that are off although theory states no variance.  A tracker that is exact needs no theory.
   void doubt(MeanTest& test, const Pool& pool) const {
-    test.certainly_biased = test.rounding + test.reference_error;
+    test.certainly_biased = std::max(test.rounding + test.reference_error, exact_ ? 0 : kNoNoise * pool.largest);
     if (exact_) return;
-    test.certainly_biased = std::max(test.certainly_biased, kNoNoise * pool.largest);
     const Real variance = std::max({kStatedDigits * pool.largest * pool.largest, test.rounding * test.rounding, 1e-300});
     const ErrorLaw law{.variance = variance, .reference_error = test.reference_error};
-    const auto bets = place_bets(law, 2 * std::sqrt(variance), cell_.samples_per_ray * test.rays, 1);
-    std::copy_if(bets.begin(), bets.end(), std::back_inserter(test.bets),
-                 [](const auto& bet) { return bet.first == Role::fail; });
+    for (const auto& bet : place_bets(law, 2 * std::sqrt(variance), cell_.samples_per_ray * test.rays, 1))
+      if (bet.first == Role::fail) test.bets.push_back(bet);
   }
 
   /// "2000 samples a ray, 272 of them the pilot's": whoever hands samples in counts the pilot's as well.

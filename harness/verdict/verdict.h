@@ -12,7 +12,7 @@ struct Proof {
 };
 
 /// Derived from the figures of the record alone.  `alpha_fail` is the level of one claim; a test makes two, "biased" and
-/// "beyond".  Samples of a deterministic test that are all right are within; others are as far within as the largest error is.
+/// "beyond".  A deterministic test is within epsilon where no sample is off by more, and biased where its bets prove it.
 Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass);
 
 /// Derives the outcomes of all tests of a verdict, and of the cell, from the figures in the record alone.
