@@ -187,7 +187,7 @@ struct LevelField {
   Json json() const { return number_or_null(value); }
   void read(const JsonNode& node) const {
     const Real number = node.number();
-    if (!(number > 0 && number < 1)) node.expected("a number between 0 and 1");
+    if (!(number > 0 && number < 1)) node.expected("a number above 0 and below 1");
     value = number;
   }
   Json schema() const { return {{"type", "number"}, {"exclusiveMinimum", 0}, {"exclusiveMaximum", 1}}; }

@@ -154,8 +154,7 @@ struct TestsField {
       TestRecord test = unproven_test();
       read_fields(element, test);
       if (test.deterministic()) {
-        const bool right = test.largest_error <= test.rounding + test.reference_error;
-        if (!element.has("log_e_fail")) test.log_e_fail = right ? 0 : kCertain;
+        if (!element.has("log_e_fail")) test.log_e_fail = test.right() ? 0 : kCertain;
         test.log_e_low = test.log_e_high = test.log_e_beyond = 0;
       }
       const int channel = test.channel;

@@ -85,6 +85,10 @@ struct TestRecord {
   TestBasis basis = TestBasis::none;
 
   bool deterministic() const { return basis == TestBasis::deterministic; }
+  /// Largest error of a right sample.
+  Real allowed_error() const { return rounding + reference_error; }
+  /// Of a deterministic test: every sample is the reference but for rounding.
+  bool right() const { return largest_error <= allowed_error(); }
   bool takes_variance() const { return basis == TestBasis::catoni || basis == TestBasis::both; }
 };
 

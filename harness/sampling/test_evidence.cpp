@@ -41,8 +41,7 @@ TestRecord test_record(const MeanTest& test, const Evidence& evidence) {
   record.largest_error = evidence.largest_error;
   record.rounding = test.rounding;
   record.planned = test.planned;
-  const bool right = record.largest_error <= record.rounding + record.reference_error;
-  if (test.deterministic && right) return record;
+  if (test.deterministic && record.right()) return record;
   if (test.deterministic && !(record.largest_error <= test.certainly_biased)) {
     record.log_e_fail = kCertain;
     return record;

@@ -22,9 +22,6 @@ std::string place_of(const TestRecord& test, const std::vector<std::string>& out
   return place.empty() ? "" : place + ": ";
 }
 
-/// The most that a sample without variance may be off by.
-Real rounding_of(const TestRecord& test) { return test.rounding + test.reference_error; }
-
 /// A mean error as a share of the reference, or itself where there is nothing to share.
 std::string as_share(Real error, Real reference) {
   return reference != 0 && std::isfinite(error / reference) ? fmt::format("{:+.2g} %", 100 * error / reference)
@@ -54,7 +51,7 @@ std::string samples_that(std::size_t count, const char* one, const char* many) {
 
 /// What a sample of a deterministic test that is not right shows.
 std::string off(const TestRecord& test, const VerdictRecord& verdict) {
-  return fmt::format("a sample is off by {:.3g}, rounding allows {:.3g}; {}{}", test.largest_error, rounding_of(test),
+  return fmt::format("a sample is off by {:.3g}, rounding allows {:.3g}; {}{}", test.largest_error, test.allowed_error(),
                      measured_bias(test),
                      verdict.variance_basis == "analytic" ? "; biased, or theory() is wrong to state a variance of 0" : "");
 }
@@ -82,7 +79,7 @@ std::string failure(const TestRecord& test, const Proof& proof, Real alpha, cons
 
 /// The error that a test excludes where it is within.
 Real margin_of(const TestRecord& test) {
-  return test.deterministic() ? std::max(rounding_of(test), test.largest_error) : test.epsilon;
+  return test.deterministic() ? std::max(test.allowed_error(), test.largest_error) : test.epsilon;
 }
 
 /// The test that PASS says least of, relative to its reference; `error` is what is small.
@@ -113,10 +110,10 @@ Proof proven(const TestRecord& test, Real alpha_fail, Real alpha_pass) {
   const Real to_fail = -std::log(alpha_fail), to_pass = -std::log(alpha_pass);
   const bool precise = test.reference_error <= kReferenceShare * test.epsilon;
   if (test.deterministic()) {
-    const bool right = test.largest_error <= rounding_of(test), biased = !right && test.log_e_fail >= to_fail;
+    const bool biased = !test.right() && test.log_e_fail >= to_fail;
     return {.biased = biased,
-            .beyond = biased && std::abs(test.mean_error) > test.epsilon + rounding_of(test),
-            .within = precise && (right || test.largest_error <= test.epsilon)};
+            .beyond = biased && std::abs(test.mean_error) > test.epsilon + test.allowed_error(),
+            .within = precise && (test.right() || test.largest_error <= test.epsilon)};
   }
   return {.biased = test.log_e_fail >= to_fail,
           .beyond = test.log_e_beyond >= to_fail,
@@ -169,8 +166,7 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
   } else if (found.open || !drawn_as_planned) {
     outcome = Outcome::inconclusive;
     // What the plan knew beforehand says more.
-    if (verdict.reason.empty() && found.open && found.open->deterministic() &&
-        found.open->largest_error > rounding_of(*found.open))
+    if (verdict.reason.empty() && found.open && found.open->deterministic() && !found.open->right())
       reason(*found.open, off(*found.open, verdict));
     else if (verdict.reason.empty() && found.open)
       reason(*found.open,
