@@ -185,12 +185,14 @@ class EstimatorWalker final : public Walker<Outside> {
     const Vec3 origin = state.local.origin, direction = state.local.direction;
     const auto look_up = [&](const Walk& walk, const Flight& flight) {
       const Real t = flight.position();
-      const Vec3 p(origin.x() + t * direction.x(), origin.y() + t * direction.y(), origin.z() + t * direction.z());
+      // Three numbers, not a point: stored as one they would be read in pairs before they are in memory.
+      const Real x = origin.x() + t * direction.x(), y = origin.y() + t * direction.y(), z = origin.z() + t * direction.z();
       if constexpr (Traits::kNeedsShares) {
         const int component = estimator_.component(walk);
-        state.extinction[0] = path_scene.medium->component_extinction(component, p) / state.ray.shares[flight.piece()][component];
+        state.extinction[0] =
+            path_scene.medium->component_extinction(component, {x, y, z}) / state.ray.shares[flight.piece()][component];
       } else {
-        path_scene.medium->extinction({&p.x(), &p.y(), &p.z(), 1}, state.extinction.data());
+        path_scene.medium->extinction({&x, &y, &z, 1}, state.extinction.data());
       }
       const Value extinction = load<Value>(state.extinction.data(), path_scene.channels);
       if constexpr (!Traits::kIgnoresMajorant)

@@ -27,8 +27,7 @@ void GridMajorant::start(Walk& walk, const Ray& world, const Ray& local) const {
 
 template <class Visit>
 bool GridMajorant::walk(Walk& walk, const Visit& visit) const {
-  return walk.steps.go_on(lattice_, walk.local,
-                          [&](Real end, const std::array<int, 3>& at) { return visit(end, lattice_.index(at)); });
+  return walk.steps.go_on(lattice_, walk.local, visit);
 }
 
 void GridMajorant::segments(const Ray& world, const Ray& local, SegmentBuffer& out) const {

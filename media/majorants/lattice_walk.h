@@ -20,11 +20,7 @@ struct Lattice {
     return all;
   }
 
-  /// x runs fastest.
-  std::size_t index(const std::array<int, 3>& at) const {
-    const auto of = [](int i) { return static_cast<std::size_t>(i); };
-    return (of(at[2]) * of(resolution[1]) + of(at[1])) * of(resolution[0]) + of(at[0]);
-  }
+  /// The numbers of a cell told by one; x runs fastest.
   std::array<int, 3> cell(std::size_t index) const {
     const auto x = static_cast<std::size_t>(resolution[0]), y = static_cast<std::size_t>(resolution[1]);
     return {static_cast<int>(index % x), static_cast<int>(index / x % y), static_cast<int>(index / x / y)};
@@ -39,7 +35,8 @@ struct Lattice {
   }
 };
 
-/// 3D-DDA [Amanatides and Woo 1987]: the cells of a lattice along a ray, from one of its points on.
+/// 3D-DDA [Amanatides and Woo 1987]: the cells of a lattice along a ray, from one of its points on.  A cell is told by its index
+/// alone: three small integers would be stored one by one and read together, and such a read waits for the stores.
 class LatticeWalk {
  public:
   /// Begins in the cell of the point at `from`, or in the nearest one.
@@ -47,54 +44,64 @@ class LatticeWalk {
     from_ = from;
     end_ = end;
     const Vec3 start = local.at(from);
+    std::ptrdiff_t stride = 1;
+    cell_ = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<Eigen::Index>(axis);
-      at_[axis] =
-          std::clamp(static_cast<int>(std::floor((start[k] - lattice.lo[k]) / lattice.size[k])), 0, lattice.resolution[axis] - 1);
-      next_[axis] = crossing(lattice, local, axis, at_[axis]);
-      after_[axis] = crossing(lattice, local, axis, at_[axis] + step(local, axis));
+      const int last = lattice.resolution[axis] - 1;
+      const int at = std::clamp(static_cast<int>(std::floor((start[k] - lattice.lo[k]) / lattice.size[k])), 0, last);
+      const bool up = local.direction[k] > 0;
+      cell_ += at * stride;
+      left_[axis] = up ? last - at : at;
+      stride_[axis] = up ? stride : -stride;
+      plane_[axis] = up ? at + 1 : at;
+      next_[axis] = crossing(lattice, local, axis);
+      plane_[axis] += up ? 1 : -1;
+      after_[axis] = crossing(lattice, local, axis);
+      stride *= last + 1;
     }
   }
 
   Real from() const { return from_; }
 
-  /// Calls visit(end, at) for the cells that follow until it returns false (then true) or the walk ends (then false).
+  /// Calls visit(end, cell) for the cells that follow until it returns false (then true) or the walk ends (then false); `cell` is
+  /// an index into the lattice.
   template <class Visit>
   bool go_on(const Lattice& lattice, const Ray& local, const Visit& visit) {
     while (from_ < end_) {
-      const std::array<int, 3> here = at_;
+      const std::ptrdiff_t here = cell_;
       const std::size_t axis = next_[0] <= next_[1] && next_[0] <= next_[2] ? 0 : next_[1] <= next_[2] ? 1 : 2;
-      const int onwards = here[axis] + step(local, axis);
-      const bool leaves = onwards < 0 || onwards >= lattice.resolution[axis];
+      const bool leaves = left_[axis] == 0;
       const Real to = leaves ? end_ : std::min(next_[axis], end_);
       if (!leaves) {
-        at_[axis] = onwards;
+        --left_[axis];
+        cell_ += stride_[axis];
         next_[axis] = after_[axis];
-        after_[axis] = crossing(lattice, local, axis, onwards + step(local, axis));
+        plane_[axis] += stride_[axis] > 0 ? 1 : -1;
+        after_[axis] = crossing(lattice, local, axis);
       }
       if (!(to > from_)) continue;
       from_ = to;
-      if (!visit(to, here)) return true;
+      if (!visit(to, static_cast<std::size_t>(here))) return true;
     }
     return false;
   }
 
  private:
-  static int step(const Ray& local, std::size_t axis) { return local.direction[static_cast<Eigen::Index>(axis)] > 0 ? 1 : -1; }
-
-  /// Where the ray leaves cell `at` along an axis.  From the plane's index, not accumulated, so that it does not drift over many
-  /// cells.
-  static Real crossing(const Lattice& lattice, const Ray& local, std::size_t axis, int at) {
+  /// Where the ray meets plane_ of an axis.  From the plane's index, not accumulated, so that it does not drift over many cells.
+  Real crossing(const Lattice& lattice, const Ray& local, std::size_t axis) const {
     const auto k = static_cast<Eigen::Index>(axis);
     const Real direction = local.direction[k];
     if (direction == 0) return kInfinity;
-    return (lattice.lo[k] + (at + (direction > 0 ? 1 : 0)) * lattice.size[k] - local.origin[k]) / direction;
+    return (lattice.lo[k] + plane_[axis] * lattice.size[k] - local.origin[k]) / direction;
   }
 
   Real from_ = 0, end_ = 0;
-  std::array<int, 3> at_{};
+  std::ptrdiff_t cell_ = 0;
+  std::array<std::ptrdiff_t, 3> left_{}, stride_{};  ///< cells ahead of the current one along each axis; between their indices
   /// Where the ray leaves its cell along each axis, and the one after it: the next step need not wait for a division.
   std::array<Real, 3> next_{}, after_{};
+  std::array<Real, 3> plane_{};  ///< index of the plane of `after_`
 };
 
 }  // namespace nullmark

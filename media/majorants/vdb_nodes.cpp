@@ -55,21 +55,19 @@ void VdbNodesMajorant::start(Walk& walk, const Ray& world, const Ray& local) con
 
 template <class Visit>
 bool VdbNodesMajorant::walk(Walk& walk, const Visit& visit) const {
-  const auto visit_leaf = [&](Real end, const std::array<int, 3>& at) {
-    return visit(end, walk.first + static_cast<std::size_t>((at[2] * kLeaves + at[1]) * kLeaves + at[0]));
-  };
+  const auto visit_leaf = [&](Real end, std::size_t leaf) { return visit(end, walk.first + leaf); };
   if (walk.inside && walk.leaves.go_on(walk.node, walk.local, visit_leaf)) return true;
   walk.inside = false;
   for (;;) {
     Real from = walk.nodes.from();
-    const bool goes_on = walk.nodes.go_on(nodes_, walk.local, [&](Real end, const std::array<int, 3>& at) {
-      const std::uint32_t first = first_cell_[nodes_.index(at)];
+    const bool goes_on = walk.nodes.go_on(nodes_, walk.local, [&](Real end, std::size_t node) {
+      const std::uint32_t first = first_cell_[node];
       if (first == kEmpty) {
         from = end;
         return visit(end, kEmpty);
       }
       walk.first = first;
-      walk.node = leaves_of(at);
+      walk.node = leaves_of(nodes_.cell(node));
       walk.leaves.start(walk.node, walk.local, from, end);
       walk.inside = true;
       return false;
