@@ -19,14 +19,20 @@ Cell concentrated(const PreparedCell& prepared, double rays_for_each) {
   return cell;
 }
 
+/// Lookups of a sample; as counted where theory does not state them.
+double lookups_of_a_sample(const PreparedCell& prepared, const Counters& probe) {
+  const double counted = static_cast<double>(probe.lookups) / static_cast<double>(std::max<std::uint64_t>(1, probe.samples));
+  return prepared.theory.lookups.value_or(counted);
+}
+
 /// Samples of each ray that cost as much as the laws of walks, which record what they draw.
-double samples_of_laws(const PreparedCell& prepared, const TestPlan& plan) {
+double samples_of_laws(const PreparedCell& prepared, const TestPlan& plan, const Counters& probe) {
   constexpr double kRecording = 3;
   const LawPolicy policy = prepared.cell->verdict.laws;
   if (policy == LawPolicy::never || (policy == LawPolicy::undecided && plan.undecidable.empty()) || plan.against != "reference")
     return 0;
   const auto rays = static_cast<double>(prepared.scene->rays->world.size());
-  const double affordable = LawBudget{}.lookups / std::max(1., prepared.theory.lookups.value_or(1)) / rays;
+  const double affordable = LawBudget{}.lookups / std::max(1., lookups_of_a_sample(prepared, probe)) / rays;
   return kRecording * std::min(affordable, static_cast<double>(LawBudget{}.most_per_ray));
 }
 
@@ -67,7 +73,7 @@ Demand::Demand(const PreparedCell& prepared, const TestLevels& levels, double ra
   samples = static_cast<double>(tests ? expected_samples(whole, *tests) : whole.samples_per_ray);
   if (!tests) return;
   if (drawn) pilot = static_cast<double>(whole.samples_per_ray);
-  laws = samples_of_laws(whole, *tests);
+  laws = samples_of_laws(whole, *tests, probe);
 }
 
 }  // namespace nullmark

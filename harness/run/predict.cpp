@@ -28,7 +28,8 @@ std::vector<std::size_t> chosen_cells(const Plan& plan, const std::vector<bool>&
   return some;
 }
 
-/// CPU seconds of a span of samples and of one more sample of each ray, measured by spans of two lengths.
+/// CPU seconds of a span of samples and of one more sample of each ray, measured by spans of two lengths, of which the longer
+/// takes kLong more.
 struct SpanCost {
   double span = 0, each = 0;
 };
@@ -42,15 +43,16 @@ SpanCost span_cost(const PreparedCell& prepared, const TestPlan* plan, std::uint
         [](double) {});
     return cpu_seconds() - began;
   };
-  std::uint64_t before = 0, count = plan ? plan->longest_sum : 1;
-  double took_before = 0, took = measured(count);
-  while (took < kLong && 2 * count <= most) {
-    before = count;
-    took_before = took;
-    took = measured(count *= 2);
-  }
-  const double each = std::max(0., took - took_before) / static_cast<double>(count - before);
-  return {std::max(0., took - each * static_cast<double>(count)), each};
+  const std::uint64_t least = plan ? plan->longest_sum : 1;
+  if (2 * least > most) return {0, measured(least) / static_cast<double>(least)};
+  // The first span of a cell fetches its memory.
+  measured(least);
+  const double took_least = measured(least);
+  std::uint64_t count = 2 * least;
+  double took = measured(count);
+  while (took - took_least < kLong && 2 * count <= most) took = measured(count *= 2);
+  const double each = std::max(0., took - took_least) / static_cast<double>(count - least);
+  return {std::max(0., took_least - each * static_cast<double>(least)), each};
 }
 
 void predict(const PreparedCell& prepared, const TestLevels& levels, double rays_for_each, Prediction& prediction) {
