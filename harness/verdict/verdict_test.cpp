@@ -70,7 +70,7 @@ TEST(Verdict, AReferenceTooCoarseProvesNothing) {
 TEST(Verdict, WithoutVarianceEverySampleMustBeRight) {
   TestRecord test = deterministic(0);
   EXPECT_EQ(decide(test, kAlpha, kAlphaPass), Outcome::pass);
-  test.largest_error = test.allowed_error();
+  test.largest_error = test.rounding + test.reference_error;
   EXPECT_EQ(decide(test, kAlpha, kAlphaPass), Outcome::pass);
   test.largest_error = std::nextafter(test.largest_error, 1);
   test.log_e_fail = kCertain;
@@ -172,7 +172,7 @@ TEST(Verdict, APassProvesWhatTheWidestOfItsTestsExcludes) {
   EXPECT_EQ(verdict.proves, "|bias| < 2 % of the mean");
   EXPECT_DOUBLE_EQ(excluded_bias(verdict), 0.02);
   verdict = verdict_of({same});
-  EXPECT_DOUBLE_EQ(excluded_bias(verdict), same.allowed_error() / 0.5);
+  EXPECT_DOUBLE_EQ(excluded_bias(verdict), (same.rounding + same.reference_error) / 0.5);
 }
 
 TEST(Verdict, ViolationsAndImpossibleSamplesComeFirst) {
