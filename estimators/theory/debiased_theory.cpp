@@ -162,6 +162,35 @@ std::pair<Real, Real> pivoted_moments(const Law& rule, const OrderChances& chanc
   return {first, square};
 }
 
+/// Means over the offsets of one level of Telescoping, of chance p: p (base - truth + difference/p)^2, difference^2/p, base and
+/// march.  mu holds the extinctions of `steps` steps of one offset after the other, w the offsets' weights.
+std::array<Real, 4> level_moments(std::vector<Real> mu, const std::vector<Real>& w, std::size_t steps, Real length, Real truth,
+                                  Real p) {
+  constexpr std::size_t kWidth = kNativeLanes<Real>;
+  mu.resize((mu.size() + kWidth - 1) / kWidth * kWidth);
+  std::vector<Real> thin(mu.size());
+  for (std::size_t i = 0; i < mu.size(); i += kWidth)
+    exponential(Lanes<Real, kWidth>(-length) * Lanes<Real, kWidth>::load(&mu[i])).store(&thin[i]);
+  const Real step = 1 / static_cast<Real>(steps);
+  std::vector<Real> base(w.size()), even(w.size()), odd(w.size());
+  for (std::size_t i = 0; i < w.size(); ++i) {
+    for (std::size_t j = i * steps; j < (i + 1) * steps; j += 2) {
+      base[i] += thin[j] + thin[j + 1];
+      even[i] += mu[j];
+      odd[i] += mu[j + 1];
+    }
+    base[i] *= step;
+  }
+  return sum_in_lanes<Real>(w.size(), [&](std::size_t i, auto pack) {
+    using Pack = decltype(pack);
+    const Pack weight = Pack::load(&w[i]), own = Pack::load(&base[i]), half(2 * step * length);
+    const Pack evens = half * Pack::load(&even[i]), odds = half * Pack::load(&odd[i]);
+    const Pack difference = march_difference(evens, odds), error = own - Pack(truth) + difference * Pack(1 / p);
+    return std::array{weight * Pack(p) * error * error, weight * difference * difference * Pack(1 / p), weight * own,
+                      weight * exponential((evens + odds) * Pack(-.5))};
+  });
+}
+
 }  // namespace
 
 // One derivation, read from top to bottom.
@@ -226,26 +255,11 @@ std::optional<Real> telescoping_variance(const RayProfile& profile, int c, Real 
   Real variance = 0, before = kInfinity, fall = kInfinity;
   for (int n = 0; n < kMostLevels; ++n) {
     const Real count = std::exp2(n + 1), p = r * std::pow(1 - r, n);
-    const auto k = static_cast<std::size_t>(count);
     const auto nodes = offset_nodes(profile, count, fine_parts(count));
     if (!nodes) return std::nullopt;
-    const std::vector<Real> mu = combs(profile, c, count, nodes->x);
-    Real squares = 0, base_mean = 0, march_mean = 0;
-    for (std::size_t i = 0; i < nodes->x.size(); ++i) {
-      const Real base = sum_in_lanes<Real>(k,
-                                           [&](std::size_t j, auto pack) {
-                                             using Pack = decltype(pack);
-                                             return std::array{exponential(Pack(-length) * Pack::load(&mu[i * k + j]))};
-                                           })[0] /
-                        count;
-      Real even = 0, odd = 0;
-      for (std::size_t j = 0; j < k; ++j) (j % 2 == 0 ? even : odd) += mu[i * k + j] * length * 2 / count;
-      const Real difference = march_difference(even, odd), error = base - truth + difference / p;
-      variance += nodes->w[i] * p * error * error;
-      squares += nodes->w[i] * difference * difference / p;
-      base_mean += nodes->w[i] * base;
-      march_mean += nodes->w[i] * exponential(-(even + odd) / 2);
-    }
+    const auto [errors, squares, base_mean, march_mean] =
+        level_moments(combs(profile, c, count, nodes->x), nodes->w, static_cast<std::size_t>(count), length, truth, p);
+    variance += errors;
     const Real fell = fall;
     const bool gone = std::max(squares, before) < kGone * variance;
     fall = squares / before;

@@ -1,5 +1,8 @@
 #include "harness/run/predict.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -29,19 +32,19 @@ std::vector<std::size_t> chosen_cells(const Plan& plan, const std::vector<bool>&
 }
 
 /// CPU seconds of a span of samples and of one more sample of each ray, measured by spans of two lengths, of which the longer
-/// takes kLong more.
+/// takes kLong more.  The calling thread draws them alone.
 struct SpanCost {
   double span = 0, each = 0;
 };
 
 SpanCost span_cost(const PreparedCell& prepared, const TestPlan* plan, std::uint64_t most) {
-  constexpr double kLong = 1e-3;
+  constexpr double kLong = 5e-4;
   const auto measured = [&](std::uint64_t per_ray) {
-    const double began = cpu_seconds();
+    const double began = thread_cpu_seconds();
     sample_cell(
         prepared.planned(), *prepared.scene, *prepared.kernel, prepared.targets, {.per_ray = per_ray}, plan, [] { return false; },
         [](double) {});
-    return cpu_seconds() - began;
+    return thread_cpu_seconds() - began;
   };
   const std::uint64_t least = plan ? plan->longest_sum : 1;
   if (2 * least > most) return {0, measured(least) / static_cast<double>(least)};
@@ -55,6 +58,7 @@ SpanCost span_cost(const PreparedCell& prepared, const TestPlan* plan, std::uint
   return {std::max(0., took_least - each * static_cast<double>(least)), each};
 }
 
+/// Verdict, samples and CPU seconds but for those of preparation and theory.
 void predict(const PreparedCell& prepared, const TestLevels& levels, double rays_for_each, Prediction& prediction) {
   const Demand demand(prepared, levels, rays_for_each);
   const TestPlan* const tests = demand.tests ? &*demand.tests : nullptr;
@@ -86,11 +90,16 @@ Forecast forecast(const Plan& plan, const std::vector<bool>& selected) {
   CellPreparer preparer(plan, kMostRays);
   const double began = cpu_seconds();
   std::vector<PreparedCell> cells = prepare_all(preparer, plan, [&](std::size_t i) { return chosen[i]; });
+  const double prepared_at = cpu_seconds();
   add_theory(cells);
-  const double theory = cells.empty() ? 0 : (cpu_seconds() - began) / static_cast<double>(cells.size());
+  // Per cell.  A medium is loaded once for all rays; theory is computed for each.
+  const double share = 1 / static_cast<double>(std::max<std::size_t>(1, cells.size()));
+  const double preparation = (prepared_at - began) * share, theory = (cpu_seconds() - prepared_at) * share;
   const TestLevels levels{plan.error_rates.alpha_pass, mean_family(plan)};
-  for (const PreparedCell& prepared : cells) {
-    Prediction prediction;
+  result.cells.resize(cells.size());
+  tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t i) {
+    const PreparedCell& prepared = cells[i];
+    Prediction& prediction = result.cells[i];
     prediction.cell = prepared.index;
     prediction.status = prepared.reason.empty() ? "ok" : prepared.reason;
     if (prepared.scene) {
@@ -106,11 +115,12 @@ Forecast forecast(const Plan& plan, const std::vector<bool>& selected) {
       }
       if (!prepared.theory.variance.empty() && prepared.theory.variance[0] && squares > 0)
         prediction.relative_variance = *prepared.theory.variance[0] * static_cast<Real>(rays) / squares;
-      if (prepared.reason.empty()) predict(prepared, levels, rays_for_each, prediction);
-      prediction.seconds += theory * rays_for_each;
+      // Threads that only wait for work would be charged to the cell.
+      tbb::task_arena alone(1);
+      if (prepared.reason.empty()) alone.execute([&] { predict(prepared, levels, rays_for_each, prediction); });
+      prediction.seconds += preparation + theory * rays_for_each;
     }
-    result.cells.push_back(prediction);
-  }
+  });
   // Each repetition times every number of samples that share a traversal, and one alone.
   const std::vector<std::uint64_t>& shared = plan.timing.samples_per_traversal;
   const std::size_t numbers = shared.size() + (std::find(shared.begin(), shared.end(), 1) == shared.end() ? 1 : 0);
