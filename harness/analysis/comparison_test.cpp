@@ -307,6 +307,14 @@ TEST(Compare, TablesTellTiesFloorsAndBreakEven) {
   EXPECT_TRUE(compare_text({}, "", false).empty());
 }
 
+TEST(Compare, NobodyIsFastestAlone) {
+  std::vector<RunRecord> runs(1);
+  runs[0].cells = {cell("a"), cell("a")};
+  EXPECT_EQ(compare_text(runs, "", false).find("no scene has two trackers to compare\n"), 0u) << compare_text(runs, "", false);
+  runs[0].cells.push_back(cell("b"));
+  EXPECT_EQ(compare_text(runs, "", false).find("Fastest to 1 % error"), 0u) << compare_text(runs, "", false);
+}
+
 TEST(Compare, SaysThatTheOthersAreTrackers) {
   std::vector<RunRecord> runs(1);
   runs[0].cells = {cell("a"), cell("b"), cell("c"), cell("d")};

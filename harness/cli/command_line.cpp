@@ -211,6 +211,7 @@ class CommandLine {
       tell("{}", wrapped(ranking, terminal_width()));
       for (std::size_t i = 0; i < runs.size(); ++i) {
         warn(files_[i], version_remark(runs[i]));
+        warn(files_[i], single_bound_remark(runs[i]));
         warn(files_[i], busy_remark(runs[i]));
       }
       if (!markdown_.empty()) write_atomically(markdown_, compare_markdown(runs, baseline_, paired_));
@@ -322,7 +323,10 @@ class CommandLine {
     CLI::App* command = add("make-volume", "Write a procedural smoke volume (OpenVDB, grid \"density\")", [this] {
       expect_new(file_, force_, " BDV");
       expect_plain_or_none(file_);
+      if (std::filesystem::path(file_).extension() != ".vdb")
+        throw InputError(fmt::format("{}: a volume is written as OpenVDB; expected a name that ends in .vdb", file_));
       write_procedural_vdb(file_, volume_);
+      notice("volume: {}\n", file_);
       return ExitCode::ok;
     });
     command->add_option("FILE", file_, "File to write")->required();

@@ -108,8 +108,9 @@ ExitCode dry_run(const Plan& plan, const std::vector<bool>& selected, bool timin
   }
   tell("{}\n", aligned(lines, 1));
   if (run.cells.size() < run.selected) tell("{} of the cells stand for all; ", run.cells.size());
-  tell("{} cells: about {:.3g} samples before those that verdicts add, {:.3g} s of CPU{}\n", run.selected, samples * run.weight(),
-       seconds * run.weight(), timing && plan.timing.enabled ? fmt::format(" and {:.3g} s of timing", run.timing_seconds) : "");
+  tell("{} cell{}: about {:.3g} samples before those that verdicts add, {:.3g} s of CPU{}\n", run.selected,
+       run.selected == 1 ? "" : "s", samples * run.weight(), seconds * run.weight(),
+       timing && plan.timing.enabled ? fmt::format(" and {:.3g} s of timing", run.timing_seconds) : "");
   if (shard.count > 1) {
     const double mean = std::accumulate(dealt.loads.begin(), dealt.loads.end(), 0.) / static_cast<double>(shard.count);
     tell("shard {}: {:.3f} of the mean load, the largest has {:.3f}; {} cells are split, and shown whole here\n", shard.text(),
@@ -247,7 +248,8 @@ void tell_results(const RunRecord& run, const std::string& output, const std::ve
   const std::size_t width = terminal_width();
   tell("{}", wrapped(results_tables(run, {width, columns}), width));
   notice("results: {}\n", output);
-  if (const auto remark = busy_remark(run)) notice("nullmark: warning: {}\n", *remark);
+  for (const auto& remark : {single_bound_remark(run), busy_remark(run)})
+    if (remark) notice("nullmark: warning: {}\n", *remark);
 }
 
 /// To the file, whose journal is done with then, or to standard output where there is no journal.

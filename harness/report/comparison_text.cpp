@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
 
@@ -221,11 +222,20 @@ std::string fastest_counted(const std::vector<Comparison>& all, bool unbiased) {
                      more > 0 ? fmt::format(" and {} more tracker{}", more, more == 1 ? "" : "s") : "");
 }
 
-/// Who is fastest where, in the words of the report's summary.
-std::string fastest_line(const std::vector<Comparison>& all) {
-  const auto ranked = static_cast<std::size_t>(
-      std::count_if(all.begin(), all.end(), [](const Comparison& one) { return !fastest(one, false).empty(); }));
-  if (ranked == 0) return "no tracker is ranked: none was timed, or none reaches 1 %\n\n";
+bool has_rivals(const Comparison& comparison) {
+  return std::any_of(comparison.cells.begin(), comparison.cells.end(),
+                     [&](const RankedCell& other) { return other.tracker != comparison.cells[0].tracker; });
+}
+
+/// Who is fastest where, in the words of the report's summary.  Whoever is alone in a scene has won nothing.
+std::string fastest_line(const std::vector<Comparison>& comparisons) {
+  if (std::none_of(comparisons.begin(), comparisons.end(), [](const Comparison& one) { return !fastest(one, false).empty(); }))
+    return "no tracker is ranked: none was timed, or none reaches 1 %\n\n";
+  std::vector<Comparison> all;
+  std::copy_if(comparisons.begin(), comparisons.end(), std::back_inserter(all),
+               [](const Comparison& one) { return has_rivals(one) && !fastest(one, false).empty(); });
+  const std::size_t ranked = all.size();
+  if (ranked == 0) return "no scene has two trackers to compare\n\n";
   const std::string unbiased = fastest_counted(all, true);
   return fmt::format(
       "Fastest to 1 % error, alone or tied, of {} scene{}: {}{}\nA rank is 1 plus the number of trackers that are proven "

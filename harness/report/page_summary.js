@@ -11,6 +11,11 @@ function unbiasedWinnersOf(scene) {
   return entries.filter(({ rank }) => rank === best);
 }
 
+/** Whoever is alone in a scene has won nothing. */
+function hasRivals(scene) {
+  return new Set(scene.ranking.map(({ cell }) => report.cells[cell]).filter(passes).map(({ estimator }) => estimator)).size > 1;
+}
+
 function claimTag(cell) {
   return cell.claims === "unbiased" || cell.claims === "exact" ? null : element("span", { className: "tag" }, cell.claims);
 }
@@ -71,7 +76,7 @@ function buildSummary(body) {
   if (report.tables.length === 0 && report.history === null && report.scenes.length <= 12) winners.open = true;
   if (report.credits.length > 0) winners.after(details("Volumes shown and their makers", element("ul", {}, ...report.credits.map((line) => element("li", {}, line)))));
   return () => {
-    const scenes = report.scenes.filter((scene) => winnersOf(scene).length > 0);
+    const scenes = report.scenes.filter((scene) => hasRivals(scene) && winnersOf(scene).length > 0);
     winners.hidden = scenes.length === 0;
     const named = scenes.flatMap((scene) => [...winnersOf(scene), ...unbiasedWinnersOf(scene)]);
     const hint = unprovenHint(named.map((entry) => secondsTo(report.cells[entry.cell], 0)));

@@ -163,7 +163,7 @@ const std::vector<std::string>& results_columns() {
 }
 
 std::string results_tables(const RunRecord& run, const TableShape& shape) {
-  std::string text = fmt::format("{} cells: {}\n\n", run.cells.size(), verdicts_counted(run));
+  std::string text = fmt::format("{} cell{}: {}\n\n", run.cells.size(), run.cells.size() == 1 ? "" : "s", verdicts_counted(run));
   std::vector<std::string> left_out;
   bool marked = false, uncertain = false, measured = false;
   for (const auto& [title, records] : grouped(run.cells, heading)) {

@@ -36,6 +36,24 @@ std::optional<std::string> version_remark(const RunRecord& run) {
   return fmt::format("measured by {}, read by {}; run the configuration again where versions matter", measured, read);
 }
 
+std::optional<std::string> single_bound_remark(const RunRecord& run) {
+  std::size_t cells = 0;
+  const CellRecord* first = nullptr;
+  for (const CellRecord& record : run.cells) {
+    const std::string& type = record.majorant->type;
+    if (!record.structure || record.structure->cells != 1 || record.medium->field.type == "homogeneous" ||
+        (type != "kd_tree" && type != "octree"))
+      continue;
+    ++cells;
+    if (!first) first = &record;
+  }
+  if (!first) return std::nullopt;
+  return fmt::format(
+      "in {} of {} cells a tree of bounds has one bound, as \"global\" has: no split of {} on {} is worth its crossings; a "
+      "smaller crossing_cost splits further",
+      cells, run.cells.size(), first->majorant->label, first->medium->label);
+}
+
 std::optional<std::string> busy_remark(const RunRecord& run) {
   std::size_t timed = 0, busy = 0;
   Real most = 0;

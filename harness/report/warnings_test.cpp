@@ -21,6 +21,23 @@ TEST(Remarks, ResultsOfAnotherVersionSaySo) {
   EXPECT_NE(version_remark(run)->find("measured by 0.0.1 (0123456), read by " + this_version()), std::string::npos);
 }
 
+TEST(Remarks, ATreeOfOneBoundSaysSo) {
+  const auto remark = [](const std::string& medium, const std::string& majorant, std::size_t cells) {
+    const Plan plan = read_config(fmt::format(R"({{"nullmark":"config/2","experiments":[{{"name":"e","rays":"single",
+        "samples_per_ray":1,"matrix":{{"estimator":"ratio","medium":"{}","majorant":"{}"}}}}]}})",
+                                              medium, majorant),
+                                  "c.json");
+    RunRecord run = example_results(plan);
+    run.cells[0].structure = StructureSize{.cells = cells};
+    return single_bound_remark(run);
+  };
+  EXPECT_NE(remark("linear", "octree", 1)->find("in 1 of 1 cells a tree of bounds has one bound"), std::string::npos);
+  EXPECT_TRUE(remark("gaussian_bump", "kd_tree", 1));
+  EXPECT_FALSE(remark("linear", "octree", 8));
+  EXPECT_FALSE(remark("linear", "global", 1));
+  EXPECT_FALSE(remark("homogeneous", "octree", 1));  // no split could lower it
+}
+
 TEST(Remarks, TimesOfABusyMachineSaySo) {
   RunRecord run = example_results();
   for (CellRecord& record : run.cells) record.time->waiting = kBusy;

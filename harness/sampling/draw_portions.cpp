@@ -36,22 +36,17 @@ constexpr Real kRangeSlack = 1e-9, kSingleRangeSlack = 1e-5;
 /// errors = values - reference; whether all values lie in [low, high], which none does that is not finite; then `largest` has
 /// grown to the largest of their magnitudes.
 bool subtract(const Real* values, Real reference, Real low, Real high, std::span<Real> errors, Real& largest) {
-  Eight value{}, most{}, least{};
-  auto inside = most == least;  // in every lane
+  Eight lowest = kInfinity, highest = -kInfinity, nothing = 0;
   std::size_t i = 0;
-  for (; i + kEight <= errors.size(); i += kEight) {
-    load(values + i, value);
-    inside &= (value >= low) & (value <= high);
-    most = value > most ? value : most;
-    least = value < least ? value : least;
-    store(value - reference, &errors[i]);
+  for (; i + Eight::kCount <= errors.size(); i += Eight::kCount) {
+    const Eight value = Eight::load(values + i);
+    lowest = smaller(value, lowest);
+    highest = larger(value, highest);
+    nothing += value - value;  // of a number that is not finite it is none
+    (value - reference).store(&errors[i]);
   }
-  bool all = true;
-  Real farthest = largest;
-  for (std::size_t lane = 0; lane < kEight; ++lane) {
-    all &= inside[lane] != 0;
-    farthest = std::max({farthest, most[lane], -least[lane]});
-  }
+  bool all = least(lowest) >= low && most(highest) <= high && total(nothing) == 0;
+  Real farthest = std::max({largest, most(highest), -least(lowest)});
   for (; i < errors.size(); ++i) {
     all &= values[i] >= low && values[i] <= high;
     errors[i] = values[i] - reference;
@@ -62,13 +57,10 @@ bool subtract(const Real* values, Real reference, Real low, Real high, std::span
 }
 
 Real sum_of_squares(std::span<const std::uint32_t> counts) {
-  using Counts [[gnu::vector_size(kEight * sizeof(std::uint32_t))]] = std::uint32_t;
-  Eight sum{};
-  Counts each;
+  Eight sum = 0;
   std::size_t i = 0;
-  for (; i + kEight <= counts.size(); i += kEight) {
-    std::memcpy(&each, &counts[i], sizeof each);
-    const Eight count = __builtin_convertvector(each, Eight);
+  for (; i + Eight::kCount <= counts.size(); i += Eight::kCount) {
+    const Eight count = Eight::load(&counts[i]);
     sum += count * count;
   }
   Real result = total(sum);

@@ -15,41 +15,25 @@ namespace {
 class Products {
  public:
   /// Takes x > 0, finite; by x^-1 where `sign` is -1.
-  void multiply(Eight x, int sign) {
-    take_exponent(x, sign);
-    mantissa_ = sign > 0 ? mantissa_ * x : mantissa_ / x;
-    take_exponent(mantissa_, 1);
+  void multiply(const Eight& x, int sign) {
+    exponent_ += Eight(sign) * exponent(x);
+    const Eight product = sign > 0 ? mantissa_ * mantissa(x) : mantissa_ / mantissa(x);
+    exponent_ += exponent(product);
+    mantissa_ = mantissa(product);
   }
 
   /// Sum of the logarithms of all lanes.
   Real log() const {
-    std::array<Real, kEight> negative;
-    store(mantissa_, negative.data());
-    negative_logarithms(negative.data(), kEight, negative.data());
+    std::array<Real, Eight::kCount> logs;
+    mantissa_.store(logs.data());
+    negative_logarithms(logs.data(), logs.size(), logs.data());
     Real sum = 0;
-    std::int64_t exponents = 0;
-    for (std::size_t lane = 0; lane < kEight; ++lane) {
-      sum -= negative[lane];
-      exponents += exponent_[lane];
-    }
-    return sum + static_cast<Real>(exponents) * std::numbers::ln2_v<Real>;
+    for (const Real negative : logs) sum -= negative;
+    return sum + total(exponent_) * std::numbers::ln2_v<Real>;
   }
 
  private:
-  using Integers [[gnu::vector_size(sizeof(Eight))]] = std::int64_t;
-
-  void take_exponent(Eight& x, int sign) {
-    constexpr int kFraction = 52;
-    constexpr std::int64_t kBias = 1023;
-    Integers bits;
-    std::memcpy(&bits, &x, sizeof bits);
-    exponent_ += sign * ((bits >> kFraction) - kBias);
-    bits = (bits & ((std::int64_t{1} << kFraction) - 1)) | (kBias << kFraction);
-    std::memcpy(&x, &bits, sizeof bits);
-  }
-
-  Eight mantissa_ = Eight{} + 1;
-  Integers exponent_{};
+  Eight mantissa_ = 1, exponent_ = 0;  // exponents are whole numbers, whose sums are exact
 };
 
 constexpr std::size_t kChains = 2;  // of factors, that do not wait for each other
@@ -60,17 +44,10 @@ using Chains = std::array<Eight, kChains>;
 struct Wild {
   static constexpr Real kMostWon = 0x1p30;
   static constexpr std::size_t kTogether = 32;
-  static Eight won(const Eight& f) {
-    const Eight capped = f < kMostWon ? f : Eight{} + kMostWon;
-    return f < 0 ? Eight{} : capped;
-  }
+  static Eight won(const Eight& f) { return where_negative(f, 0, smaller(f, kMostWon)); }
   static void take(const Chains& factors, Products& products, int sign) {
     // A wealth that is lost for good; what this adds to its expectation is nothing.
-    const Eight least = Eight{} + 1e-300, most = Eight{} + 1e300;
-    for (const Eight& x : factors) {
-      const Eight above = x > least ? x : least;
-      products.multiply(above < most ? above : most, sign);
-    }
+    for (const Eight& x : factors) products.multiply(smaller(larger(x, 1e-300), 1e300), sign);
   }
 };
 
@@ -121,18 +98,18 @@ class Wager {
       std::array<Real, count> l, start;
       for (std::size_t r = 0; r < count; ++r) l[r] = rate_[r] * side_, start[r] = 1 - l[r] * neutral_;
       multiply<Size, count, false>(sums, [=](const Eight& x, std::size_t chain, auto& won, auto&) {
-        for (std::size_t r = 0; r < count; ++r) won[r][chain] *= Size::won(start[r] + l[r] * x);
+        for (std::size_t r = 0; r < count; ++r) won[r][chain] *= Size::won(Eight(start[r]) + Eight(l[r]) * x);
       });
     } else {
       std::array<Real, count> rate;
       std::copy_n(rate_.begin(), count, rate.begin());
       multiply<Size, count, true>(
           sums, [rate, side = side_, neutral = neutral_](const Eight& x, std::size_t chain, auto& won, auto& lost) {
-            const Eight gain = side * (x - neutral), size = magnitude(gain);
+            const Eight gain = Eight(side) * (x - neutral), size = magnitude(gain);
             for (std::size_t r = 0; r < count; ++r) {
-              const Eight y = rate[r] * size, f = 1 + y * (1 + y / 2);
-              won[r][chain] = gain < 0 ? won[r][chain] : won[r][chain] * Size::won(f);
-              lost[r][chain] = gain < 0 ? lost[r][chain] * f : lost[r][chain];
+              const Eight y = Eight(rate[r]) * size, f = Eight(1) + y * (Eight(1) + y * .5);
+              won[r][chain] = where_negative(gain, won[r][chain], won[r][chain] * Size::won(f));
+              lost[r][chain] = where_negative(gain, lost[r][chain] * f, lost[r][chain]);
             }
           });
     }
@@ -143,20 +120,17 @@ class Wager {
   void multiply(std::span<const Real> sums, const Factor& factor) {
     for (std::size_t i = 0; i < sums.size();) {
       std::array<Chains, count> won, lost;
-      for (std::size_t r = 0; r < count; ++r) won[r].fill(Eight{} + 1), lost[r].fill(Eight{} + 1);
-      Eight x;
-      for (std::size_t k = 0; k < Size::kTogether && i + kChains * kEight <= sums.size(); ++k)
-        for (std::size_t chain = 0; chain < kChains; ++chain, i += kEight) {
-          load(&sums[i], x);
-          factor(x, chain, won, lost);
+      for (std::size_t r = 0; r < count; ++r) won[r].fill(1), lost[r].fill(1);
+      for (std::size_t k = 0; k < Size::kTogether && i + kChains * Eight::kCount <= sums.size(); ++k)
+        for (std::size_t chain = 0; chain < kChains; ++chain, i += Eight::kCount) {
+          factor(Eight::load(&sums[i]), chain, won, lost);
         }
-      if (sums.size() - i < kChains * kEight)
-        for (std::size_t chain = 0; i < sums.size(); ++chain, i += kEight) {
-          std::array<Real, kEight> rest;
+      if (sums.size() - i < kChains * Eight::kCount)
+        for (std::size_t chain = 0; i < sums.size(); ++chain, i += Eight::kCount) {
+          std::array<Real, Eight::kCount> rest;
           rest.fill(neutral_);  // whose factor is 1
-          std::copy_n(&sums[i], std::min(kEight, sums.size() - i), rest.data());
-          load(rest.data(), x);
-          factor(x, chain, won, lost);
+          std::copy_n(&sums[i], std::min(Eight::kCount, sums.size() - i), rest.data());
+          factor(Eight::load(rest.data()), chain, won, lost);
         }
       for (std::size_t r = 0; r < count; ++r) {
         Size::take(won[r], products_[r], 1);
@@ -175,17 +149,16 @@ class Wager {
 
 /// Least and most, infinite where not all are finite.
 std::pair<Real, Real> extent(std::span<const Real> x) {
-  Eight least = Eight{} + kInfinity, most = -least, nothing{}, each;
+  Eight low = kInfinity, high = -kInfinity, nothing = 0;
   std::size_t i = 0;
-  for (; i + kEight <= x.size(); i += kEight) {
-    load(&x[i], each);
-    least = each < least ? each : least;
-    most = each > most ? each : most;
+  for (; i + Eight::kCount <= x.size(); i += Eight::kCount) {
+    const Eight each = Eight::load(&x[i]);
+    low = smaller(each, low);
+    high = larger(each, high);
     nothing += each - each;
   }
-  std::pair<Real, Real> ends(kInfinity, -kInfinity);
+  std::pair<Real, Real> ends(least(low), most(high));
   Real rest = total(nothing);
-  for (std::size_t lane = 0; lane < kEight; ++lane) ends = {std::min(ends.first, least[lane]), std::max(ends.second, most[lane])};
   for (; i < x.size(); ++i) {
     ends = {std::min(ends.first, x[i]), std::max(ends.second, x[i])};
     rest += x[i] - x[i];

@@ -8,10 +8,10 @@ namespace nullmark {
 namespace {
 
 Real sum_of_squares(std::span<const Real> x) {
-  Eight sum{}, each;
+  Eight sum = 0;
   std::size_t i = 0;
-  for (; i + kEight <= x.size(); i += kEight) {
-    load(&x[i], each);
+  for (; i + Eight::kCount <= x.size(); i += Eight::kCount) {
+    const Eight each = Eight::load(&x[i]);
     sum += each * each;
   }
   Real result = total(sum);
@@ -21,14 +21,11 @@ Real sum_of_squares(std::span<const Real> x) {
 
 /// sums[j] = x[2j] + x[2j + 1]; returns the sum of their squares.
 Real add_pairs(const Real* x, std::size_t pairs, Real* sums) {
-  Eight squares{}, low, high;
+  Eight squares = 0;
   std::size_t j = 0;
-  for (; j + kEight <= pairs; j += kEight) {
-    load(x + 2 * j, low);
-    load(x + 2 * j + kEight, high);
-    const Eight sum = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14) +
-                      __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
-    store(sum, sums + j);
+  for (; j + Eight::kCount <= pairs; j += Eight::kCount) {
+    const Eight sum = Eight::sums_of_pairs(x + 2 * j);
+    sum.store(sums + j);
     squares += sum * sum;
   }
   Real result = total(squares);
@@ -42,10 +39,10 @@ Real add_pairs(const Real* x, std::size_t pairs, Real* sums) {
 }  // namespace
 
 void Moments::add(std::span<const Real> errors) {
-  Eight first{}, second{}, third{}, fourth{}, error;
+  Eight first = 0, second = 0, third = 0, fourth = 0;
   std::size_t i = 0;
-  for (; i + kEight <= errors.size(); i += kEight) {
-    load(&errors[i], error);
+  for (; i + Eight::kCount <= errors.size(); i += Eight::kCount) {
+    const Eight error = Eight::load(&errors[i]);
     const Eight square = error * error;
     first += error;
     second += square;

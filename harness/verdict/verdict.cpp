@@ -157,7 +157,8 @@ void conclude(VerdictRecord& verdict, const Found& found, const std::vector<std:
     verdict.reason = samples_that(verdict.nonfinite, "is", "are") + " not finite";
   } else if (verdict.out_of_range > 0) {
     outcome = Outcome::fail;
-    verdict.reason = samples_that(verdict.out_of_range, "lies", "lie") + " outside the declared range" + ends_of(range);
+    verdict.reason = samples_that(verdict.out_of_range, "lies", "lie") + " outside the declared range" + ends_of(range) +
+                     "; if such samples are right, the tracker must declare a wider range";
     if (found.failed)
       verdict.reason += "; " + place_of(*found.failed, outputs, one_channel) + without_proof(*found.failed, alpha, "that range");
   } else if (found.failed) {

@@ -180,15 +180,18 @@ TEST(Verdict, ViolationsAndImpossibleSamplesComeFirst) {
   verdict.out_of_range = 1;
   decide(verdict);
   EXPECT_EQ(verdict.unbiased, Outcome::fail);
-  EXPECT_EQ(verdict.reason, "1 sample lies outside the declared range");
+  EXPECT_EQ(verdict.reason,
+            "1 sample lies outside the declared range; if such samples are right, the tracker must declare a wider range");
   decide(verdict, {}, "unit");
-  EXPECT_EQ(verdict.reason, "1 sample lies outside the declared range (unit: 0 to 1)");
+  EXPECT_EQ(verdict.reason,
+            "1 sample lies outside the declared range (unit: 0 to 1); if such samples are right, the tracker must declare a "
+            "wider range");
   // What the mean shows stands beside it, so that nobody widens the range and believes the rest.
   VerdictRecord both = verdict_of({failing()});
   both.out_of_range = 1;
   decide(both);
   EXPECT_EQ(both.unbiased, Outcome::fail);
-  EXPECT_NE(both.reason.find("1 sample lies outside the declared range; mean "), std::string::npos) << both.reason;
+  EXPECT_NE(both.reason.find("the tracker must declare a wider range; mean "), std::string::npos) << both.reason;
   EXPECT_NE(both.reason.find("no bias is proven: the evidence (log E "), std::string::npos) << both.reason;
   verdict.out_of_range = 0;
   verdict.nonfinite = 1;

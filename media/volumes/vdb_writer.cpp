@@ -76,7 +76,9 @@ void write_grid(const std::string& path, const openvdb::FloatGrid::Ptr& grid, co
   } catch (const std::exception& error) {
     std::error_code ignored;
     std::filesystem::remove(temporary, ignored);
-    throw ParameterError("file", fmt::format("{}: cannot write the volume: {}", path, error.what()));
+    const bool no_folder = !std::filesystem::exists(std::filesystem::absolute(path).parent_path(), ignored);
+    throw ParameterError(
+        "file", fmt::format("{}: cannot write the volume: {}", path, no_folder ? "its folder does not exist" : error.what()));
   }
 }
 
