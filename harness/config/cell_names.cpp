@@ -1,7 +1,6 @@
 #include "harness/config/cell_names.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -60,8 +59,8 @@ void add_distinctions(const Plan& plan, const std::vector<Cell*>& cells) {
 }  // namespace
 
 void name_cells(Plan& plan) {
-  tbb::parallel_for(std::size_t{0}, plan.cells.size(), [&](std::size_t i) { plan.cells[i].id = cell_id(plan, plan.cells[i]); });
   for (Cell& cell : plan.cells) {
+    cell.id = cell_id(plan, cell);
     cell.name = fmt::format("{}{}/{}/{}", cell.estimator->label, cell.minus ? "/minus:" + (*cell.minus)->label : "",
                             plan.media[cell.medium]->label, plan.majorants[cell.majorant]->label);
     if (cell.precision != Precision::float64) cell.name += "/" + to_string(cell.precision);

@@ -1,7 +1,6 @@
 #include "harness/io/spec_json.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "harness/io/claims_json.h"
 #include "harness/io/spec_fields.h"
@@ -89,15 +88,12 @@ std::string applied_config(const Plan& plan) {
   std::string text =
       fmt::format(R"({{"{}":"{}","name":{},"timing":{},"error_rates":{},"experiments":[)", kVersionKey, kConfigVersion,
                   Json(plan.name).dump(), fields_json(plan.timing).dump(), fields_json(plan.error_rates).dump());
-  std::vector<std::string> texts(plan.cells.size());
-  tbb::parallel_for(std::size_t{0}, texts.size(), [&](std::size_t i) { texts[i] = applied_json(plan, plan.cells[i]).dump(); });
   const std::string* experiment = nullptr;
-  for (std::size_t i = 0; i < texts.size(); ++i) {
-    const Cell& cell = plan.cells[i];
+  for (const Cell& cell : plan.cells) {
     const bool same = experiment && *experiment == cell.experiment;
     if (!same) text += fmt::format(R"({}{{"name":{},"include":[)", experiment ? "]}," : "", Json(cell.experiment).dump());
     experiment = &cell.experiment;
-    text += (same ? "," : "") + texts[i];
+    text += (same ? "," : "") + applied_json(plan, cell).dump();
   }
   text += fmt::format(R"({}],"tables":{})", experiment ? "]}" : "", tables_json(plan.tables).dump());
   if (!plan.claims.empty()) text += fmt::format(R"(,"claims":{})", claims_json(plan.claims).dump());

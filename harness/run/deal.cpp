@@ -6,6 +6,7 @@
 
 #include "harness/registry/components.h"
 #include "harness/run/demand.h"
+#include "harness/sampling/cell_theory.h"
 #include "harness/sampling/failure.h"
 #include "harness/sampling/test_families.h"
 

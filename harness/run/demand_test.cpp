@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "harness/config/config.h"
+#include "harness/sampling/cell_theory.h"
 #include "harness/sampling/test_families.h"
 #include "harness/verdict/walk_laws.h"
 

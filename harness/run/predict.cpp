@@ -9,6 +9,7 @@
 #include "harness/registry/components.h"
 #include "harness/run/cpu_clock.h"
 #include "harness/run/demand.h"
+#include "harness/sampling/cell_theory.h"
 #include "harness/sampling/test_families.h"
 #include "harness/verdict/judge.h"
 

@@ -23,6 +23,7 @@
 #include "harness/run/cpu_clock.h"
 #include "harness/run/run_cell.h"
 #include "harness/run/task_thread.h"
+#include "harness/sampling/cell_theory.h"
 #include "harness/sampling/test_families.h"
 #include "harness/sampling/timing.h"
 #include "harness/verdict/judge.h"

@@ -12,6 +12,7 @@
 #include "harness/run/cell_draws.h"
 #include "harness/run/cell_images.h"
 #include "harness/run/cell_record.h"
+#include "harness/sampling/cell_theory.h"
 #include "harness/sampling/failure.h"
 #include "harness/verdict/reliance.h"
 

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
+#include <set>
 
 #include "harness/kernel/difference_kernel.h"
 #include "harness/kernel/path_kernel.h"
@@ -18,9 +18,6 @@
 
 namespace nullmark {
 namespace {
-
-/// Cells of a scene whose theory is computed together: they share the rays' profiles, and each holds a workspace a thread.
-constexpr std::size_t kTheoriesAtOnce = 64;
 
 /// Adds the component's JSON pointer to what its construction complains of.
 template <class F>
@@ -38,12 +35,6 @@ constexpr Real kDeepestSingle = 1 << 14;
 constexpr Real kFarthestSingle = 1 << 10, kFarthestDouble = 0x1p39;
 /// Of the end of a ray from its origin, in sizes of the medium.
 constexpr Real kFarthestRaySingle = 1 << 14, kFarthestRayDouble = 0x1p43;
-
-/// What a tracker throws is its cell's failure; a mistake in the configuration and a lack of memory are not.
-template <class F>
-std::string tracker_failure(F&& f) {
-  return failure_of<ParameterError, MissingData, std::bad_alloc>(f);
-}
 
 template <class Key, class Value, class Make>
 std::shared_ptr<const Value> once(std::map<Key, std::shared_ptr<const Value>>& cache, const Key& key, Make&& make) {
@@ -248,6 +239,22 @@ std::shared_ptr<const BuiltMedium> CellPreparer::medium(std::size_t index) {
   });
 }
 
+void CellPreparer::build_media(const std::vector<std::size_t>& cells) {
+  std::set<std::size_t> wanted;
+  for (const std::size_t i : cells) wanted.insert(plan_.cells[i].medium);
+  std::vector<std::pair<std::size_t, std::shared_ptr<const BuiltMedium>>> built;
+  for (const std::size_t medium : wanted) built.emplace_back(medium, nullptr);
+  tbb::parallel_for_each(built.begin(), built.end(), [&](auto& each) {
+    try {
+      each.second = std::make_shared<const BuiltMedium>(build_medium(*plan_.media[each.first]));
+    } catch (const std::exception&) {
+      // Built again by its cell, which says why it fails.
+    }
+  });
+  for (const auto& [medium, done] : built)
+    if (done) media_.emplace(medium, done);
+}
+
 std::string CellPreparer::medium_hash(std::size_t index) {
   try {
     return hash_text(*medium(index));
@@ -310,88 +317,9 @@ std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, 
     if (wanted(i)) places.push_back(i);
   std::vector<PreparedCell> cells;
   cells.reserve(places.size());
+  preparer.build_media(places);
   for (const std::size_t i : places) cells.push_back(stop() ? unprepared(plan, i) : preparer.prepare(i));
   return cells;
-}
-
-namespace {
-
-/// Beyond this a double does not tell two counts of samples apart.
-constexpr Real kMostSamples = 0x1p53;
-
-/// As many samples as take the given lookups.
-void equalise(PreparedCell& prepared, Real wanted) {
-  if (!prepared.theory.lookups || !(*prepared.theory.lookups > 0)) {
-    prepared.reason = "equal_lookups needs an estimator and medium with known expected lookups above 0";
-    return;
-  }
-  const Real samples = wanted / *prepared.theory.lookups;
-  if (samples <= kMostSamples)
-    prepared.samples_per_ray = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(samples)));
-  else
-    prepared.reason = fmt::format("equal_lookups {:.3g} makes {:.3g} samples a ray of {:.3g} lookups each; expected at most 2^53",
-                                  wanted, samples, *prepared.theory.lookups);
-}
-
-/// A walk that takes more lookups than the bound is an error of its cell, however long it took to come there.
-void refuse_endless(PreparedCell& prepared) {
-  static const Real most = Workspace().most_lookups;
-  if (prepared.theory.most_lookups > most)
-    prepared.reason = fmt::format(
-        "a sample is expected to take {:.3g} lookups; at most {:.3g} are allowed: the depth of the majorant "
-        "is that large; give a thinner medium or a tighter majorant",
-        prepared.theory.most_lookups, most);
-  // Where theory cannot resolve so steep an extinction it states no lookups.
-  constexpr Real kDeepest = 0x1p40;
-  if (!prepared.theory.lookups && prepared.theory.majorant_depth > kDeepest)
-    prepared.reason = fmt::format(
-        "how many lookups a sample takes is not known, and the majorant's depth is {:.3g}; expected at most 2^40: give a thinner "
-        "medium or a tighter majorant",
-        prepared.theory.majorant_depth);
-}
-
-/// What follows from the theory of a cell.
-void follow_theory(PreparedCell& prepared) {
-  if (prepared.cell->equal_lookups) equalise(prepared, *prepared.cell->equal_lookups);
-  if (prepared.reason.empty()) refuse_endless(prepared);
-}
-
-}  // namespace
-
-void add_theory(std::vector<PreparedCell>& cells, const std::function<bool()>& stop) {
-  std::map<const Scene*, std::vector<PreparedCell*>> by_scene;
-  for (PreparedCell& prepared : cells) {
-    const bool plain = prepared.cell->measurement == Measurement{};
-    if (prepared.scene && prepared.reason.empty() && plain && !prepared.theory_later && prepared.kernel->states_theory())
-      by_scene[prepared.scene.get()].push_back(&prepared);
-  }
-  std::vector<std::span<PreparedCell* const>> batches;
-  for (const auto& [scene, members] : by_scene)
-    for (std::size_t first = 0; first < members.size(); first += kTheoriesAtOnce)
-      batches.push_back(std::span(members).subspan(first, std::min(kTheoriesAtOnce, members.size() - first)));
-  tbb::parallel_for_each(batches.begin(), batches.end(), [&](const auto& members) {
-    if (stop()) return;
-    const Scene& scene = *members.front()->scene;
-    std::vector<TheoryQuery> queries;
-    for (const PreparedCell* member : members)
-      queries.push_back({member->kernel.get(), member->cell->quantity, member->range, &member->targets, &member->cell->name});
-    const std::string failure = tracker_failure([&] {
-      const std::vector<CellTheory> theory = compute_theory(scene, queries);
-      for (std::size_t i = 0; i < members.size(); ++i) members[i]->theory = theory[i];
-    });
-    // One of them threw: each by itself shows which.
-    for (std::size_t i = 0; i < members.size() && !failure.empty(); ++i)
-      members[i]->reason = members[i]->failure =
-          tracker_failure([&] { members[i]->theory = compute_theory(scene, {queries[i]})[0]; });
-  });
-  if (stop()) return;
-  for (PreparedCell& prepared : cells)
-    if (prepared.reason.empty() && !prepared.theory_later) follow_theory(prepared);
-}
-
-void take_theory(PreparedCell& prepared, CellTheory theory) {
-  prepared.theory = std::move(theory);
-  follow_theory(prepared);
 }
 
 }  // namespace nullmark

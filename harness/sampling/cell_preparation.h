@@ -49,6 +49,9 @@ class CellPreparer {
   /// for specifications that do not fit their medium.  What else a tracker throws is the cell's `failure`.
   PreparedCell prepare(std::size_t index);
 
+  /// Builds the media of cells side by side.  One that cannot be built is told when its cell is prepared.
+  void build_media(const std::vector<std::size_t>& cells);
+
   /// Hash of a medium of the plan and of its data, as records tell it; empty where its data are missing.
   std::string medium_hash(std::size_t medium);
 
@@ -86,15 +89,5 @@ PreparedCell unprepared(const Plan& plan, std::size_t index);
 std::vector<PreparedCell> prepare_all(
     CellPreparer& preparer, const Plan& plan, const std::function<bool(std::size_t)>& wanted,
     const std::function<bool()>& stop = [] { return false; });
-
-/// Adds theory to all cells that can run, scene by scene.  Cells with a measurement get none, because it changes the law of the
-/// samples.  With equal_lookups, the number of samples follows from the theory.  A cell whose tracker throws has a `failure`.
-/// A cell has a `reason` where a sample can be expected to exceed the bound on its lookups, and where no count holds its samples.
-/// Once `stop` returns true, the theory of scenes that are left is not computed.
-void add_theory(
-    std::vector<PreparedCell>& cells, const std::function<bool()>& stop = [] { return false; });
-
-/// Adds a theory that was computed before to a cell that can run; the same holds as for `add_theory`.
-void take_theory(PreparedCell& prepared, CellTheory theory);
 
 }  // namespace nullmark

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <exception>
+#include <new>
 #include <string>
 
 #include "harness/kernel/tracker_failure.h"
+#include "media/base/parameters.h"
+#include "media/base/registry.h"
 
 namespace nullmark {
 
@@ -25,6 +28,12 @@ std::string failure_of(F&& f) {
   }
   std::replace(failure.begin(), failure.end(), '\n', ' ');
   return failure;
+}
+
+/// What a tracker throws is its cell's failure; a mistake in the configuration and a lack of memory are not.
+template <class F>
+std::string tracker_failure(F&& f) {
+  return failure_of<ParameterError, MissingData, std::bad_alloc>(f);
 }
 
 }  // namespace nullmark
