@@ -58,7 +58,7 @@ std::string members_text(const std::string& type) {
   // Of a tracker from outside there is no header with members.
   if (used.empty() && others.empty()) return "";
   if (used.empty()) used = {"no optional member"};
-  return list_text("uses:", used) + list_text("not stated:", others);
+  return list_text("uses:", used) + list_text("may also state:", others);
 }
 
 /// Runs the battery and hands its results to `conclude`.

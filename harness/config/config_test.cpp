@@ -233,6 +233,14 @@ TEST(Config, ErrorsAreOneLineWithPlaceAndRemedy) {
        "t.json:3:3: key \"name\" occurs twice in this object"},
       {"{\"nullmark\": \"config/2\",\n  \"seed\": 01}",
        "t.json:2:12: syntax error while parsing object - unexpected number literal; expected '}'"},
+      {R"({"nullmark": "config/2",})",
+       "t.json:1:25: syntax error while parsing object key - unexpected '}'; expected string literal; remove the comma before "
+       "it"},
+      {R"({"nullmark": "config/2", // grey
+ "seed": 1})",
+       "t.json:1:26: syntax error while parsing object key - invalid literal; last read: '\"config/2\", /'; expected string "
+       "literal; "
+       "JSON has no comments"},
       {experiment(R"("matrix":{"estimator":"ratio","medium":"linear"},"exclude":[{"estimator":"ratio"}])"),
        R"(t.json: /experiments/0: found no cell after "exclude" and "constraints"; expected at least one)"}};
   for (const auto& [text, message] : cases) EXPECT_EQ(error_of(text), message);

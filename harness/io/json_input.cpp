@@ -60,6 +60,15 @@ std::string bare_message(const std::string& what) {
   return what;
 }
 
+/// What to do about the two slips that other formats allow: a comment, or a comma after the last entry.
+std::string remedy(std::string_view text, std::size_t at) {
+  if (at == 0) return "";
+  const std::size_t before = text.find_last_not_of(" \t\r\n", at - 1);
+  if (before == std::string_view::npos) return "";
+  if (text[at] == '/' || text[before] == '/') return "; JSON has no comments";
+  return text[before] == ',' && (text[at] == '}' || text[at] == ']') ? "; remove the comma before it" : "";
+}
+
 /// Where the string begins whose closing quote stands at `end`.
 std::size_t opening_quote(std::string_view text, std::size_t end) {
   for (std::size_t at = end; at-- > 0;) {
@@ -134,8 +143,8 @@ Json parse_json(const std::string& text, const std::string& file) {
     if (error.byte > text.size())
       throw InputError(position(file, text, text.size()) +
                        (text.empty() ? ": is empty; expected JSON" : ": ends in the middle; expected the whole of a JSON file"));
-    throw InputError(position(file, text, std::min(text.size(), std::max<std::size_t>(error.byte, 1) - 1)) + ": " +
-                     bare_message(error.what()));
+    const std::size_t at = std::min(text.size() - 1, std::max<std::size_t>(error.byte, 1) - 1);
+    throw InputError(position(file, text, at) + ": " + bare_message(error.what()) + remedy(text, at));
   } catch (const Json::out_of_range& error) {
     throw InputError(position(file, text, std::max<std::size_t>(offset(), 1) - 1) + ": " + bare_message(error.what()));
   }
