@@ -266,7 +266,8 @@ TEST_F(SampleFiles, ProblemsThatFailLeaveNothing) {
   write("c.json", volume(""));
   EXPECT_EQ(run("problem c.json -o q --resolution 8"), 2);
   EXPECT_EQ(read("err"),
-            "nullmark: c.json: /experiments/0/matrix/medium/1/file: nowhere.vdb: no such file in the current folder (grid \"density\"); say "
+            "nullmark: c.json: /experiments/0/matrix/medium/1/file: nowhere.vdb: no such file in the current folder (grid "
+            "\"density\"); say "
             "\"optional\": true "
             "to leave it out\n");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "q"));
