@@ -49,9 +49,9 @@ std::optional<std::string> single_bound_remark(const RunRecord& run) {
   }
   if (!first) return std::nullopt;
   return fmt::format(
-      "in {} of {} cells a tree of bounds has one bound, as \"global\" has: no split of {} on {} is worth its crossings; a "
-      "smaller crossing_cost splits further",
-      cells, run.cells.size(), first->majorant->label, first->medium->label);
+      "in {} of {} cells a tree of bounds has one bound, as \"global\" has, such as {} on {}; `nullmark list majorants {}` tells "
+      "the options that decide its splits",
+      cells, run.cells.size(), first->majorant->label, first->medium->label, first->majorant->type);
 }
 
 std::optional<std::string> busy_remark(const RunRecord& run) {

@@ -17,7 +17,7 @@ std::optional<std::string> version_remark(const RunRecord& run);
 /// If a timed thread waited for a larger share of the wall time than this, other work had its core.
 inline constexpr Real kBusy = 0.05;
 
-/// One line if a tree of bounds found no split worth its crossings in a medium that varies: it bounds no better than `global`.
+/// One line if a tree of bounds was not split in a medium that varies: it bounds no better than `global`.
 std::optional<std::string> single_bound_remark(const RunRecord& run);
 
 /// One line if times were taken on a busy machine.

@@ -241,7 +241,8 @@ std::shared_ptr<const BuiltMedium> CellPreparer::medium(std::size_t index) {
 
 void CellPreparer::build_media(const std::vector<std::size_t>& cells) {
   std::set<std::size_t> wanted;
-  for (const std::size_t i : cells) wanted.insert(plan_.cells[i].medium);
+  for (const std::size_t i : cells)
+    if (!media_.contains(plan_.cells[i].medium)) wanted.insert(plan_.cells[i].medium);
   std::vector<std::pair<std::size_t, std::shared_ptr<const BuiltMedium>>> built;
   for (const std::size_t medium : wanted) built.emplace_back(medium, nullptr);
   tbb::parallel_for_each(built.begin(), built.end(), [&](auto& each) {
@@ -317,7 +318,7 @@ std::vector<PreparedCell> prepare_all(CellPreparer& preparer, const Plan& plan, 
     if (wanted(i)) places.push_back(i);
   std::vector<PreparedCell> cells;
   cells.reserve(places.size());
-  preparer.build_media(places);
+  if (!stop()) preparer.build_media(places);
   for (const std::size_t i : places) cells.push_back(stop() ? unprepared(plan, i) : preparer.prepare(i));
   return cells;
 }

@@ -49,7 +49,7 @@ class CellPreparer {
   /// for specifications that do not fit their medium.  What else a tracker throws is the cell's `failure`.
   PreparedCell prepare(std::size_t index);
 
-  /// Builds the media of cells side by side.  One that cannot be built is told when its cell is prepared.
+  /// Builds those media of cells side by side that are not built.  One that cannot be is told when its cell is prepared.
   void build_media(const std::vector<std::size_t>& cells);
 
   /// Hash of a medium of the plan and of its data, as records tell it; empty where its data are missing.
