@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-#include "harness/io/spec_json.h"
+#include "harness/io/cell_texts.h"
 #include "harness/io/transport_json.h"
 #include "harness/model/names.h"
 #include "harness/registry/components.h"
@@ -59,8 +59,9 @@ void add_distinctions(const Plan& plan, const std::vector<Cell*>& cells) {
 }  // namespace
 
 void name_cells(Plan& plan) {
+  CellTexts texts(plan);
   for (Cell& cell : plan.cells) {
-    cell.id = cell_id(plan, cell);
+    cell.id = texts.id(cell);
     cell.name = fmt::format("{}{}/{}/{}", cell.estimator->label, cell.minus ? "/minus:" + (*cell.minus)->label : "",
                             plan.media[cell.medium]->label, plan.majorants[cell.majorant]->label);
     if (cell.precision != Precision::float64) cell.name += "/" + to_string(cell.precision);

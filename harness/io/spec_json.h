@@ -18,9 +18,6 @@ Json medium_json(const MediumSpec& medium);
 /// Adds a medium's effects on light beside extinction: albedo, anisotropy, emission.
 void add_matter(Json& json, const MediumSpec& medium);
 
-/// Hash of everything that determines a cell's statistics, as 16 hexadecimal digits of canonical text.
-std::string cell_id(const Plan& plan, const Cell& cell);
-
 /// The plan as a configuration that names every cell explicitly; reading it gives the same plan.  One line, canonical.
 std::string applied_config(const Plan& plan);
 
