@@ -87,6 +87,9 @@ namespace nullmark {
 //       Distance<Value>, Truth<Value> or structs of them, which the loop no longer changes once a walk has ended;
 //       init, propose, consume and result take ray, flight and stream as auto, and branch by select() and flight.next(rng, alive)
 //       where walks can differ (see lane_kernel.h).  flight.lookups() cannot differ
+//   using Kept
+//       with kLanes: the walk of one sample, where it holds more than registers (see mis_bidirectional.h).  keep(walk, ray, at,
+//       alive, kept) hands what walks in lanes have come to over to kept(lane), after each consume; finish(kept, ray) ends one
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
 //       the harness fills exact_depth, knots, distance_at_depth, shares
 //

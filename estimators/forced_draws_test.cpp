@@ -107,6 +107,7 @@ void hold_in_float(const std::shared_ptr<const Medium>& medium) {
   using Pack = Lanes<float, 1>;
   using Streams = LaneRng<float, 1>;
   const E<Pack> tracker;
+  constexpr bool kKeeps = requires { typename E<Pack>::Kept; };
   constexpr int kCalls = 24;
   for (const Real looseness : {1., 4.}) {
     const HandWalked<E> walked({}, medium, 1, looseness, 4);
@@ -120,8 +121,10 @@ void hold_in_float(const std::shared_ptr<const Medium>& medium) {
         const auto in_flight = [&] { return LaneFlight<float, 1>(rates, place, lookups); };
         LaneFlight<float, 1> flight = in_flight();
         typename E<Pack>::Walk walk;
+        typename E<Real>::Walk kept;
         flight.start(walked.ray.majorant);
         tracker.init(walk, walked.ray, flight, rng);
+        if constexpr (kKeeps) tracker.init(kept, walked.ray, flight, rng);
         int calls = 0;
         const auto force = [&] {
           if (calls++ != at) return;
@@ -142,9 +145,17 @@ void hold_in_float(const std::shared_ptr<const Medium>& medium) {
           ASSERT_TRUE(t >= 0 && t <= 1) << E<Real>::kName << " " << t;
           force();
           tracker.consume(walk, walked.ray, in_flight(), Pack(static_cast<float>(walked.extinction(t))), rng);
+          if constexpr (kKeeps)
+            tracker.keep(
+                walk, walked.ray, in_flight(), LaneMask<float, 1>(true), [&](std::size_t) -> auto& { return kept; });
         }
         float result;
-        Pack(tracker.result(walk, walked.ray)).store(&result);
+        if constexpr (kKeeps) {
+          tracker.finish(kept, walked.ray);
+          result = static_cast<float>(tracker.result(kept, walked.ray));
+        } else {
+          Pack(tracker.result(walk, walked.ray)).store(&result);
+        }
         ASSERT_TRUE(std::isfinite(result)) << E<Real>::kName << " call " << at << " of " << calls;
         if (calls <= at) at = kCalls;
       }

@@ -24,7 +24,7 @@ struct PlantedLostWalks : BidirectionalMis<Value> {
   static constexpr const char* kSource = "";
   static constexpr const char* kCaughtBy = "mean";
 
-  Value result(const typename BidirectionalMis<Value>::Walk& walk, const MediumRay<Value>&) const { return walk.joined; }
+  Value result(const typename BidirectionalMis<Value>::Kept& walk, const auto&) const { return walk.joined(); }
 };
 
 }  // namespace nullmark

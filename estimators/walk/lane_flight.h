@@ -116,6 +116,19 @@ class LaneFlight {
     return inside;
   }
 
+  /// Moves to points of the given depths, cell by cell from where the flights are.
+  [[gnu::always_inline]] Mask travel_to(Pack depth, Mask alive) {
+    if (several && rates_.last_ > 0) {
+      for (;;) {
+        const Mask ahead =
+            alive & (Index(0) < at_.piece) & (depth < rates_.template of<several, &RatePiece<T>::depth_before>(at_.piece));
+        if (none(ahead)) break;
+        at_.piece = select(ahead, at_.piece + Index(-1), at_.piece);
+      }
+    }
+    return advance_to(depth, alive);
+  }
+
   /// Moves to points of the given depths, wherever the flights are.
   [[gnu::always_inline]] Mask land(Pack depth) {
     at_.piece = Index(0);

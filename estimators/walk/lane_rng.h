@@ -61,7 +61,18 @@ class LaneRng {
       state_[w] = hn::IfThenElse(hn::RebindMask(Tag(), lanes.mask()), state_[w], before[w]);
     return u;
   }
-  Pack exponential(Mask lanes) { return negative_logarithm(Pack(1) - uniform_where(lanes)); }
+  Pack exponential(Mask lanes) { return exponential_and_decay(lanes).exponential; }
+
+  /// exponential() and e to the minus it.
+  [[gnu::always_inline]] ExponentialAndDecay<Pack> exponential_and_decay() {
+    draws_ += living_;
+    const Pack decay = rest();
+    return {negative_logarithm(decay), decay};
+  }
+  [[gnu::always_inline]] ExponentialAndDecay<Pack> exponential_and_decay(Mask lanes) {
+    const Pack decay = Pack(1) - uniform_where(lanes);
+    return {negative_logarithm(decay), decay};
+  }
 
   /// Takes back the count of a draw by lanes whose walk had ended: they leave with it.
   void forget(Mask lanes) { draws_ -= count(lanes & alive_); }

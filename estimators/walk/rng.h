@@ -86,13 +86,14 @@ class Rng {
   Real ready_ = -1;
 };
 
-/// A unit exponential e = -log(1 - u) and e^-e = 1 - u.
+/// Unit exponentials e = -log(1 - u) and e^-e = 1 - u.
+template <class Number>
 struct ExponentialAndDecay {
-  Real exponential, decay;
+  Number exponential, decay;
 };
 
 /// The next exponential of a stream; one that does not show its numbers takes e^-e from e.
-[[gnu::always_inline]] inline ExponentialAndDecay exponential_and_decay(auto& rng) {
+[[gnu::always_inline]] inline ExponentialAndDecay<Real> exponential_and_decay(auto& rng) {
   if constexpr (requires { rng.peek(); }) {
     const Real decay = rng.peek();
     return {rng.exponential(), decay};

@@ -139,6 +139,10 @@ class BlockKernel : public Kernel {
     return result;
   }
 
+ protected:
+  /// The estimator of one walk.
+  const E& one() const { return estimator_; }
+
  private:
   // The loop that trackers are timed in stays in one piece.
   template <bool recorded>

@@ -8,59 +8,10 @@
 
 #include "estimators/walk/lane_flight.h"
 #include "harness/kernel/block_kernel.h"
+#include "harness/kernel/lane_registers.h"
 #include "media/base/colour_lanes.h"
 
 namespace nullmark {
-
-/// Becomes anything.
-struct Anything {
-  template <class T>
-  operator T() const;
-};
-
-/// Number of members of an aggregate.
-template <class Aggregate, class... Members>
-consteval std::size_t member_count() {
-  if constexpr (requires { Aggregate{Members()..., Anything()}; })
-    return member_count<Aggregate, Members..., Anything>();
-  else
-    return sizeof...(Members);
-}
-
-/// Visits the registers of an aggregate, and of those in it, in their order.
-template <class Aggregate, class Visit>
-[[gnu::always_inline]] inline void each_register(Aggregate& x, const Visit& visit) {
-  if constexpr (requires { x.vector(); }) {
-    visit(x);
-  } else if constexpr (requires { x.kChannels; }) {
-    for (std::size_t c = 0; c < x.kChannels; ++c) visit(x[c]);
-  } else {
-    static_assert(std::is_aggregate_v<Aggregate>,
-                  "a walk in lanes holds Value, Distance<Value>, Truth<Value> and structs of them");
-    constexpr std::size_t n = member_count<Aggregate>();
-    static_assert(n >= 1 && n <= 6, "a struct of a walk in lanes has one to six members");
-    const auto all = [&](auto&... members) __attribute__((always_inline)) { (each_register(members, visit), ...); };
-    if constexpr (n == 1) {
-      auto& [a] = x;
-      all(a);
-    } else if constexpr (n == 2) {
-      auto& [a, b] = x;
-      all(a, b);
-    } else if constexpr (n == 3) {
-      auto& [a, b, c] = x;
-      all(a, b, c);
-    } else if constexpr (n == 4) {
-      auto& [a, b, c, d] = x;
-      all(a, b, c, d);
-    } else if constexpr (n == 5) {
-      auto& [a, b, c, d, e] = x;
-      all(a, b, c, d, e);
-    } else {
-      auto& [a, b, c, d, e, f] = x;
-      all(a, b, c, d, e, f);
-    }
-  }
-}
 
 /// The loop of BlockKernel with N walks per register, over C channels: the same estimator source over Lanes or LaneColours, the
 /// same steps, and in double the same samples bit for bit.  All walks of a block take a step together.  The numbers of an ended
@@ -81,7 +32,10 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
   using Streams = LaneRng<T, N>;
 
   static constexpr bool kSingle = !std::is_same_v<T, Real>;
-  static constexpr std::size_t kBlock = 2048 / sizeof(T);  ///< walks whose numbers fit the L1 cache together
+  using OneWalk = typename Estimator<OfChannels<C>>::Walk;
+  static constexpr bool kKeeps = requires { typename E::Kept; };
+  /// Walks whose numbers fit the L1 cache together, or whose vertices fit the L2 cache.
+  static constexpr std::size_t kBlock = kKeeps ? 64 : 2048 / sizeof(T);
 
   /// N walks.  All registers have the same lane order, so one permutation compacts them.
   struct Walks {
@@ -125,6 +79,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, sizeof(typename E::Walk) / sizeof(Pack)> left_walk{};
     alignas(HWY_MAX_BYTES) std::array<T, kRow> left_sample{}, left_steps{};
     alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, C> left_result{};
+    std::array<OneWalk, kKeeps ? kBlock : 0> kept;  ///< of each sample of the block
   };
 
  public:
@@ -197,6 +152,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
 
     [[gnu::flatten]] void block(std::size_t count) {
       Tally tally{.walks = count};
+      if constexpr (kKeeps) begin_kept(count);
       std::size_t lanes = (count + N - 1) / N * N;
       const Medium* field = &medium;
       // One number a lookup, multiplied in registers, takes less time than a spectrum in memory.
@@ -279,6 +235,10 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
         audit_majorant(largest(extinction), majorant.template rate<several>(flight.piece()), alive, tally.violations,
                        counters.largest_violation);
       kernel.estimator_.consume(walks.walk, state.ray, flight, extinction, rng);
+      if constexpr (kKeeps)
+        kernel.estimator_.keep(walks.walk, state.ray, flight, alive, [&](std::size_t lane) -> OneWalk& {
+          return state.kept[sample_at(state.numbers[kSample], k + lane)];
+        });
       propose(k, walks, alive, ended, flight, rng, step, tally);
     }
 
@@ -308,6 +268,17 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
         if (moves_along(axis)) (Pack(origin[axis]) + t * Pack(direction[axis])).store(&state.points[axis][k]);
     }
 
+    /// Begins what the estimator keeps of each sample.
+    [[gnu::noinline]] void begin_kept(std::size_t count) {
+      Flight flight;
+      Rng rng;
+      for (std::size_t i = 0; i < count; ++i) kernel.one().init(state.kept[i], state.ray, flight, rng);
+    }
+
+    static std::size_t sample_at(const std::array<T, kRow>& samples, std::size_t k) {
+      return static_cast<std::size_t>(std::bit_cast<typename Index::Number>(samples[k]));
+    }
+
     Value answer(const Walks& walks) const {
       if constexpr (requires { kernel.estimator_.optical_depth(walks.walk, state.ray); })
         if (quantity == Quantity::optical_depth) return kernel.estimator_.optical_depth(walks.walk, state.ray);
@@ -334,16 +305,22 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
           if (moves_along(axis)) close(close_living, state.points[axis], state.points[axis], kept);
         kept += count(alive);
       }
-      for (std::size_t i = 0; i < left; i += N) {
-        Walks walks;
-        walks.each_of_walk([&](auto& number, std::size_t n)
-                               __attribute__((always_inline)) { load(number, state.left_walk[n - kWalk], i); });
-        const Value answer = this->answer(walks);
-        for (std::size_t c = 0; c < C; ++c) channel(answer, c).store(&state.left_result[c][i]);
-      }
+      if constexpr (!kKeeps)
+        for (std::size_t i = 0; i < left; i += N) {
+          Walks walks;
+          walks.each_of_walk([&](auto& number, std::size_t n)
+                                 __attribute__((always_inline)) { load(number, state.left_walk[n - kWalk], i); });
+          const Value answer = this->answer(walks);
+          for (std::size_t c = 0; c < C; ++c) channel(answer, c).store(&state.left_result[c][i]);
+        }
       for (std::size_t i = 0; i < left; ++i) {
-        const auto sample = static_cast<std::size_t>(std::bit_cast<typename Index::Number>(state.left_sample[i]));
-        for (std::size_t c = 0; c < C; ++c) values[sample * C + c] = state.left_result[c][i];
+        const std::size_t sample = sample_at(state.left_sample, i);
+        if constexpr (kKeeps) {
+          kernel.one().finish(state.kept[sample], state.ray);
+          store(kernel.one().result(state.kept[sample], state.ray), &values[sample * C]);
+        } else {
+          for (std::size_t c = 0; c < C; ++c) values[sample * C + c] = state.left_result[c][i];
+        }
         lookups[sample] = static_cast<std::uint32_t>(std::bit_cast<typename Index::Number>(state.left_steps[i]));
         tally.lookups += lookups[sample];
       }
@@ -390,7 +367,9 @@ constexpr bool runs_in_lanes() {
       e.init(walk, ray, flight, rng);
       e.propose(walk, ray, flight, rng);
       e.consume(walk, ray, flight, extinction, rng);
-      e.result(walk, ray);
+      requires requires { typename E::Kept; } || requires {
+        e.result(walk, ray);
+      };
     };
   } else {
     return false;

@@ -7,6 +7,7 @@
 #include "estimators/jackknife.h"
 #include "estimators/majorant_guided_ratio.h"
 #include "estimators/marching_inversion.h"
+#include "estimators/mis_bidirectional.h"
 #include "estimators/mis_unidirectional.h"
 #include "estimators/next_flight_delta.h"
 #include "estimators/next_flight_ratio.h"
@@ -64,6 +65,7 @@ TEST(Lanes, DeltaTrackingIsTheSameAtEveryWidth) { compare_widths<DeltaTracking>(
 TEST(Lanes, WeightedDeltaTrackingIsTheSameAtEveryWidth) { compare_widths<WeightedDeltaTracking>(kAsItIs); }
 TEST(Lanes, NextFlightRatioTrackingIsTheSameAtEveryWidth) { compare_widths<NextFlightRatioTracking>(kAsItIs); }
 TEST(Lanes, UnidirectionalMisIsTheSameAtEveryWidth) { compare_widths<UnidirectionalMis>(kAsItIs); }
+TEST(Lanes, BidirectionalMisIsTheSameAtEveryWidth) { compare_widths<BidirectionalMis>(kAsItIs); }
 TEST(Lanes, NextFlightDeltaTrackingIsTheSameAtEveryWidth) {
   compare_widths<NextFlightDeltaTracking>(kAsItIs);
   compare_widths<NextFlightDeltaTracking>([](auto& estimator) { estimator.variant = "b"; });

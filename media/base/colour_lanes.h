@@ -50,6 +50,15 @@ class LaneColours {
     return loaded;
   }
 
+  friend std::array<SpectrumOf<static_cast<int>(C)>, N> numbers(const LaneColours& a) {
+    std::array<SpectrumOf<static_cast<int>(C)>, N> x;
+    for (std::size_t c = 0; c < C; ++c) {
+      const auto one = numbers(a[c]);
+      for (std::size_t k = 0; k < N; ++k) x[k][static_cast<Eigen::Index>(c)] = one[k];
+    }
+    return x;
+  }
+
   Pack& operator[](std::size_t c) { return channels_[c]; }
   const Pack& operator[](std::size_t c) const { return channels_[c]; }
 
@@ -81,6 +90,10 @@ class LaneColours {
     LaneColours result;
     for (std::size_t c = 0; c < C; ++c) result[c] = select(yes.channels[c], a[c], b[c]);
     return result;
+  }
+
+  friend LaneColours select(LaneMask<T, N> yes, const LaneColours& a, const LaneColours& b) {
+    return each(a, b, [&](Pack x, Pack y) { return select(yes, x, y); });
   }
 
   friend LaneColours smaller(const LaneColours& a, const LaneColours& b) {
@@ -151,6 +164,7 @@ template <class T, std::size_t N, std::size_t C>
 struct Walking<LaneColours<T, N, C>> {
   using Distance = Lanes<T, N>;
   using Truth = LaneTruth<T, N>;
+  using OneSample = SpectrumOf<static_cast<int>(C)>;
 };
 
 /// table[index] per lane.

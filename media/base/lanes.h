@@ -41,6 +41,11 @@ class Lanes {
   /// some processors.
   void store(T* to, LaneMask<T, N> lanes) const { select(lanes, *this, load(to)).store(to); }
   Vector vector() const { return vector_; }
+  friend std::array<T, N> numbers(Lanes a) {
+    std::array<T, N> x;
+    a.store(x.data());
+    return x;
+  }
 
   friend Lanes operator+(Lanes a, Lanes b) { return hn::Add(a.vector_, b.vector_); }
   friend Lanes operator-(Lanes a, Lanes b) { return hn::Sub(a.vector_, b.vector_); }
@@ -146,6 +151,12 @@ class LaneMask {
   friend LaneMask operator|(LaneMask a, LaneMask b) { return hn::Or(a.mask_, b.mask_); }
   friend LaneMask operator!(LaneMask a) { return hn::Not(a.mask_); }
   friend std::size_t count(LaneMask a) { return hn::CountTrue(Tag(), a.mask_); }
+  /// Lane k as bit k.
+  friend std::uint64_t as_bits(LaneMask a) {
+    std::uint64_t bits = 0;
+    hn::StoreMaskBits(Tag(), a.mask_, reinterpret_cast<std::uint8_t*>(&bits));
+    return bits;
+  }
   friend bool none(LaneMask a) { return hn::AllFalse(Tag(), a.mask_); }
   friend Lanes<T, N> select(LaneMask yes, Lanes<T, N> a, Lanes<T, N> b) {
     return hn::IfThenElse(yes.mask_, a.vector(), b.vector());
@@ -166,6 +177,7 @@ class LaneTruth {
   hn::Vec<hn::FixedTag<T, N>> vector() const { return bits_; }
   operator LaneMask<T, N>() const { return hn::MaskFromVec(bits_); }
   friend LaneMask<T, N> operator!(LaneTruth a) { return !LaneMask<T, N>(a); }
+  friend std::uint64_t as_bits(LaneTruth a) { return as_bits(LaneMask<T, N>(a)); }
   friend Lanes<T, N> select(LaneTruth yes, Lanes<T, N> a, Lanes<T, N> b) { return select(LaneMask<T, N>(yes), a, b); }
   friend LaneTruth select(LaneMask<T, N> yes, LaneTruth a, LaneTruth b) {
     return LaneTruth(hn::IfThenElse(yes.mask(), a.bits_, b.bits_));
@@ -183,6 +195,7 @@ template <class T, std::size_t N>
 struct Walking<Lanes<T, N>> {
   using Distance = Lanes<T, N>;
   using Truth = LaneTruth<T, N>;
+  using OneSample = Real;
 };
 
 /// N indices, signed and as wide as T, for tables of T.

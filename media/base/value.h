@@ -1,6 +1,7 @@
 #pragma once
 
 #include <concepts>
+#include <type_traits>
 #include <vector>
 
 #include "media/base/elementary.h"
@@ -137,11 +138,19 @@ template <class Value>
 struct Walking {
   using Distance = Real;
   using Truth = bool;
+  using OneSample = Value;
 };
 template <class Value>
 using Distance = typename Walking<Value>::Distance;
 template <class Value>
 using Truth = typename Walking<Value>::Truth;
+/// The Value of one of its samples.
+template <class Value>
+using OneSample = typename Walking<Value>::OneSample;
+
+/// Whether a Value is of several samples.
+template <class Value>
+inline constexpr bool kSideBySide = !std::is_same_v<Value, OneSample<Value>>;
 
 /// Whether a Value's numbers are floats.
 template <class Value>
