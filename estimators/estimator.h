@@ -88,8 +88,9 @@ namespace nullmark {
 //       init, propose, consume and result take ray, flight and stream as auto, and branch by select() and flight.next(rng, alive)
 //       where walks can differ (see lane_kernel.h).  flight.lookups() cannot differ
 //   using Kept
-//       with kLanes: the walk of one sample, where it holds more than registers (see mis_bidirectional.h).  keep(walk, ray, at,
-//       alive, kept) hands what walks in lanes have come to over to kept(lane), after each consume; finish(kept, ray) ends one
+//       with kLanes: the walk of one sample, where it holds more than registers (see unbiased_ray_marching.h); Kept::kTogether of
+//       them make a block.  keep(walk, ray, at, alive, kept) hands what walks in lanes have come to over to kept(lane), after each
+//       consume; finish(kept, ray) ends one, and result(kept, ray) is its sample
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
 //       the harness fills exact_depth, knots, distance_at_depth, shares
 //

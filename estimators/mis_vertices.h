@@ -15,6 +15,9 @@ namespace nullmark {
 template <class Value>
 class MisVertices {
  public:
+  /// Walks of a block, whose vertices fit the L2 cache together.
+  static constexpr std::size_t kTogether = 64;
+
   /// The origin of one of both walks, or a collision.
   struct Vertex {
     Real depth;    ///< majorant depth from the ray's begin
@@ -58,23 +61,23 @@ class MisVertices {
     const Real *const growth_a = growth_.data(), *const growth_b = growth_a + a.size();
     alone_ = b.back().weight / (2 + gaps_[b.size() - 1] + exponential(b.back().depth));
     PairSums sums(channels);
-    std::size_t nearest = depth_.size() - kTogether;  // begin of the last group with a vertex beyond the forward one
+    std::size_t nearest = depth_.size() - kGroup;  // begin of the last group with a vertex beyond the forward one
     // ahead[j] = e^(b_j - from) for j >= known, and nearer = e^(from - a_i).
     Real from = -kInfinity, nearer = 1, gaps = 0;
     std::size_t known = 0;
     for (std::size_t i = 0; i < a.size(); ++i) {
-      while (nearest > 0 && !(depth_[nearest] > a[i].depth)) nearest -= kTogether;
+      while (nearest > 0 && !(depth_[nearest] > a[i].depth)) nearest -= kGroup;
       gaps += growth_a[i];
       nearer *= a[i].nearer;
       if (a[i].depth - from > kStretch) {
         from = a[i].depth;
         nearer = 1;
-        known = std::min(nearest + kTogether, b.size()) - 1;
+        known = std::min(nearest + kGroup, b.size()) - 1;
         ahead_[known] = exponential(b[known].depth - from);
       }
       // Products of a million factors do not reach 0 but stay at the least denormal number, and all of their pairs add nothing.
       if (largest(Value(magnitude(a[i].weight))) * most < std::numeric_limits<Real>::min()) continue;
-      for (std::size_t first = nearest;; first -= kTogether) {
+      for (std::size_t first = nearest;; first -= kGroup) {
         for (Real ahead = ahead_[known]; known > first; --known) ahead_[known - 1] = ahead *= growth_b[known];
         sums.add(a[i].weight, &weight_[first], depth_.size(), shares(first, a[i].depth, 2 + gaps, nearer));
         if (first == 0 || is_rounding(a[i].weight, heaviest * static_cast<Real>(first), nearer * ahead_[first], sums, channels))
@@ -87,10 +90,10 @@ class MisVertices {
 
  private:
   /// Vertices that are joined to a vertex of the other walk together.
-  static constexpr std::size_t kTogether = 8;
-  static constexpr std::size_t kWidth = std::min(kTogether, kNativeLanes<Real>);
+  static constexpr std::size_t kGroup = 8;
+  static constexpr std::size_t kWidth = std::min(kGroup, kNativeLanes<Real>);
   using Pack = Lanes<Real, kWidth>;
-  using Group = std::array<Pack, kTogether / kWidth>;
+  using Group = std::array<Pack, kGroup / kWidth>;
   /// Depth over which e^depth is a product of one exponential with the e^gap between.
   static constexpr Real kStretch = 32;
 
@@ -133,7 +136,7 @@ class MisVertices {
   /// Sets the backward vertices side by side, and the e^gap of all.  Returns the largest backward weight.
   Real line_up(int channels) {
     const std::span<const Vertex> b = backwards();
-    const std::size_t n = b.size(), padded = (n + kTogether - 1) / kTogether * kTogether;
+    const std::size_t n = b.size(), padded = (n + kGroup - 1) / kGroup * kGroup;
     growth_.resize(vertices_.size());
     for (std::size_t i = 0; i < growth_.size(); ++i) growth_[i] = vertices_[i].nearer;
     for (Real& growth : growth_) growth = 1 / growth;  // a loop of its own is vectorised
@@ -182,7 +185,7 @@ class MisVertices {
   std::vector<Vertex> vertices_;  ///< of the forward walk, then of the backward one
   std::size_t turn_ = 0;          ///< number of forward vertices, once that walk has ended; 0 before
   Value joined_, alone_;
-  std::vector<Real> growth_;      ///< e^gap of each vertex
+  std::vector<Real> growth_;  ///< e^gap of each vertex
   // The backward vertices side by side, their number rounded up to whole groups:
   std::vector<Real> depth_;   ///< as in the vertex, but inf for the ray's end; -inf in what completes the last group
   std::vector<Real> gaps_;    ///< sum of e^gap up to the vertex

@@ -4,11 +4,24 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include "estimators/estimator.h"
 #include "estimators/theory/debiased_theory.h"
 
 namespace nullmark {
+
+/// The marches of one sample of unbiased ray marching.
+template <class Value>
+struct Marches {
+  static constexpr std::size_t kTogether = 256;  ///< walks of a block, most of which end after one march
+  static constexpr int kMostOrder = 32;          ///< P_32 = 8e-28
+  std::array<Value, kMostOrder + 1> march;       ///< X = -h sum mu, of those that are complete
+  Value sum, trend;                              ///< of the march at hand; mu(d) - mu(0)
+  Real offset = 0;
+  std::uint32_t before = 0;  ///< lookups before that march
+  int order = 0, complete = 0;
+};
 
 /// Unbiased ray marching [Kettunen, d'Eon, Pantaleoni, Novák 2021].  A march of M steps with one offset o, X = -h sum_j mu((o +
 /// j) h), estimates -tau; e^{-tau} = e^p E[sum_k (X - p)^k/k!] is expanded about a pivot p that is itself such a march.  n + 1
@@ -30,8 +43,10 @@ struct UnbiasedRayMarching {
   static constexpr SampleRange kRange = SampleRange::any_sign;
   static constexpr bool kNeedsBound = false;
   static constexpr bool kIgnoresMajorant = true;
+  static constexpr bool kLanes = true;
 
-  static constexpr int kMostOrder = 32;                       ///< P_32 = 8e-28
+  using Kept = Marches<OneSample<Value>>;
+  static constexpr int kMostOrder = Kept::kMostOrder;
   static constexpr Real kMeanOrder = 0.31945280494653251;     ///< sum_k P_k = (e^2 - 1)/20
   static constexpr Real kOrderVariance = 1.0563083202513903;  ///< (3 e^2 + 1)/20 - that squared
 
@@ -66,25 +81,25 @@ struct UnbiasedRayMarching {
     ray.lookups = static_cast<std::uint32_t>(std::min<Real>(ray.steps, std::numeric_limits<std::uint32_t>::max()));
   }
 
-  struct Walk {
-    std::array<Value, kMostOrder + 1> march;  ///< -h sum mu, of those that are complete
-    Value sum, trend;                         ///< of the march at hand; mu(d) - mu(0)
-    Real offset = 0;
-    std::uint32_t before = 0;  ///< lookups before that march
-    int order = 0, complete = 0;
+  /// In lanes a walk holds the march at hand, and the kernel has the marches of each sample beside; all walks of a block are at
+  /// the same step of a march.
+  struct March {
+    Value sum, trend;
+    Distance<Value> offset, left;  ///< left: further marches
   };
+  using Walk = std::conditional_t<kSideBySide<Value>, March, Kept>;
 
-  void init(Walk& walk, const RayData& ray, Flight&, auto& rng) const {
+  void init(Kept& walk, const auto& ray, auto&, auto& rng) const {
     walk.sum = walk.trend = ray.value(0);
-    walk.before = endpoint_matching ? 2 : 0;
+    walk.before = ends();
     walk.order = walk.complete = 0;
     if (rng.uniform() < .1)
       for (walk.order = 2; walk.order < kMostOrder && rng.uniform() * (walk.order + 1) < 2;) ++walk.order;
   }
 
-  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
+  bool propose(Kept& walk, const auto& ray, auto& flight, auto& rng) const {
     if (!(ray.steps > 0) || walk.complete > walk.order) return false;
-    if (endpoint_matching && flight.lookups() < 2) {
+    if (at_ends(flight.lookups())) {
       flight.jump(flight.lookups() == 0 ? ray.begin : ray.end);
       return true;
     }
@@ -94,19 +109,66 @@ struct UnbiasedRayMarching {
     return true;
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto&) const {
-    if (endpoint_matching && at.lookups() <= 2) {
+  void consume(Kept& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
+    if (at_ends(at.lookups() - 1)) {
       walk.trend = extinction - walk.trend;
       return;
     }
     walk.sum += extinction;
     if (at.lookups() - walk.before < ray.lookups) return;
-    walk.march[static_cast<std::size_t>(walk.complete++)] = (walk.trend * (walk.offset - .5) - walk.sum) * ray.step;
+    add_march(walk, ray, walk.sum, walk.trend, walk.offset);
     walk.sum = ray.value(0);
     walk.before = at.lookups();
   }
 
-  Value result(const Walk& walk, const RayData& ray) const {
+  void init(March& walk, const auto&, auto&, auto& rng) const {
+    walk = {Value(0), Value(0), Distance<Value>(0), Distance<Value>(0)};
+    auto longer = rng.uniform() < Distance<Value>(.1);
+    walk.left = select(longer, Distance<Value>(2), walk.left);
+    for (int order = 2; order < kMostOrder && !none(longer); ++order) {
+      longer = longer & (rng.uniform_where(longer) * Distance<Value>(order + 1) < Distance<Value>(2));
+      walk.left = select(longer, Distance<Value>(order + 1), walk.left);
+    }
+  }
+
+  auto propose(March& walk, const auto& ray, auto& flight, auto& rng) const {
+    const std::uint32_t lookups = flight.lookups();
+    if (at_ends(lookups)) {
+      flight.jump(Distance<Value>(lookups == 0 ? ray.begin : ray.end));
+      return (Distance<Value>(ray.steps) > Distance<Value>(0)) & !(walk.left < Distance<Value>(0));
+    }
+    const std::uint32_t done = steps_done(ray, lookups);
+    if (done == 0 && lookups > ends()) {
+      walk.left = walk.left - Distance<Value>(1);
+      walk.sum = Value(0);
+    }
+    const auto goes_on = (Distance<Value>(ray.steps) > Distance<Value>(0)) & !(walk.left < Distance<Value>(0));
+    if (done == 0) walk.offset = rng.uniform(goes_on);
+    flight.jump(Distance<Value>(ray.begin) + (walk.offset + Distance<Value>(done)) * Distance<Value>(ray.step));
+    return goes_on;
+  }
+
+  void consume(March& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
+    if (at_ends(at.lookups() - 1))
+      walk.trend = extinction - walk.trend;
+    else
+      walk.sum += extinction;
+  }
+
+  /// Hands marches in lanes that are complete over to `kept(lane)`.
+  void keep(const March& walk, const auto& ray, const auto& at, auto alive, const auto& kept) const {
+    if (at.lookups() <= ends() || steps_done(ray, at.lookups()) != 0) return;
+    const auto sum = numbers(walk.sum), trend = numbers(walk.trend);
+    const auto offset = numbers(walk.offset);
+    const std::uint64_t lives = as_bits(alive);
+    for (std::size_t k = 0; k < offset.size(); ++k)
+      if ((lives >> k & 1) != 0) add_march(kept(k), ray, sum[k], trend[k], offset[k]);
+  }
+
+  /// Ends a walk in lanes.
+  void finish(Kept& walk, const auto&) const { walk.order = walk.complete - 1; }
+
+  OneSample<Value> result(const Kept& walk, const auto& ray) const {
     if (!(ray.steps > 0)) return ray.value(1);
     // So long a series comes up once in 10^27 samples; cut short it would be wrong, so that it counts as an error.
     if (walk.order == kMostOrder) return ray.value(std::numeric_limits<Real>::quiet_NaN());
@@ -123,13 +185,27 @@ struct UnbiasedRayMarching {
   }
 
  private:
-  static Value series(const Walk& walk, const RayData& ray) {
+  using One = OneSample<Value>;
+
+  std::uint32_t ends() const { return endpoint_matching ? 2 : 0; }
+  /// Whether the next lookup is of an end of the ray.
+  bool at_ends(std::uint32_t lookups) const { return lookups < ends(); }
+  /// Of the march at hand, of walks that have all marched since the ends.
+  std::uint32_t steps_done(const auto& ray, std::uint32_t lookups) const {
+    return ray.lookups > 0 ? (lookups - ends()) % ray.lookups : 0;
+  }
+
+  static void add_march(Kept& walk, const auto& ray, const One& sum, const One& trend, Real offset) {
+    walk.march[static_cast<std::size_t>(walk.complete++)] = (trend * (offset - .5) - sum) * ray.step;
+  }
+
+  static One series(const Kept& walk, const auto& ray) {
     const auto n = static_cast<std::size_t>(walk.order);
-    Value sum = ray.value(0);
+    One sum = ray.value(0);
     for (std::size_t pivot = 0; pivot <= n; ++pivot) {
-      const Value scale = exponential(walk.march[pivot]);
+      const One scale = exponential(walk.march[pivot]);
       if (vanished(scale)) continue;
-      std::array<Value, kMostOrder + 1> mean;
+      std::array<One, kMostOrder + 1> mean;
       std::fill_n(mean.begin(), n + 1, ray.value(0));
       mean[0] = ray.value(1);
       std::size_t q = 0;
@@ -139,7 +215,7 @@ struct UnbiasedRayMarching {
         for (std::size_t k = q; k > 0; --k)
           mean[k] += static_cast<Real>(k) / static_cast<Real>(q) * (mean[k - 1] * (walk.march[i] - walk.march[pivot]) - mean[k]);
       }
-      Value terms = ray.value(1);
+      One terms = ray.value(1);
       Real twentieth = .05;  // k! P_k
       for (std::size_t k = 1; k <= n; ++k) terms += mean[k] / (twentieth *= 2);
       sum += select(scale > 0, scale * terms, ray.value(0));

@@ -32,7 +32,7 @@ TEST(LaneColours, EveryTrackerInLanesHasTheSamplesOfThePlainLoop) {
     expect_plain_samples({entry.name, {}, {}, {}}, kThree);
     expect_plain_samples({entry.name, {}, {}, {}}, kFour);
   }
-  EXPECT_EQ(trackers, 19);
+  EXPECT_EQ(trackers, 20);
 }
 
 TEST(LaneColours, ParametersChangeNothingOfThat) {
@@ -46,6 +46,7 @@ TEST(LaneColours, ParametersChangeNothingOfThat) {
     expect_plain_samples({"residual_ratio", {{"control", control}}, {}, {}}, kFour);
     expect_plain_samples({"residual_delta", {{"control", control}}, {}, {}}, kThree);
   }
+  expect_plain_samples({"unbiased_ray_marching", {{"endpoint_matching", true}}, {}, {}}, kThree);
   for (const char* control : {"linear", "exponential"})
     expect_plain_samples({"residual_ratio", {{"control", control}, {"value", .5}, {"value_end", 2.}}, {}, {}}, kFour);
 }

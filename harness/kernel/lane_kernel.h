@@ -34,8 +34,11 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
   static constexpr bool kSingle = !std::is_same_v<T, Real>;
   using OneWalk = typename Estimator<OfChannels<C>>::Walk;
   static constexpr bool kKeeps = requires { typename E::Kept; };
-  /// Walks whose numbers fit the L1 cache together, or whose vertices fit the L2 cache.
-  static constexpr std::size_t kBlock = kKeeps ? 64 : 2048 / sizeof(T);
+  /// Walks whose numbers fit the L1 cache together, or as many as the estimator keeps.
+  static constexpr std::size_t kBlock = [] {
+    if constexpr (kKeeps) return E::Kept::kTogether;
+    return 2048 / sizeof(T);
+  }();
 
   /// N walks.  All registers have the same lane order, so one permutation compacts them.
   struct Walks {

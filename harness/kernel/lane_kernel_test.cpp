@@ -23,6 +23,7 @@
 #include "estimators/residual_ratio.h"
 #include "estimators/telescoping.h"
 #include "estimators/telescoping_difference.h"
+#include "estimators/unbiased_ray_marching.h"
 #include "estimators/weighted_decomposition.h"
 #include "estimators/weighted_delta.h"
 #include "harness/kernel/estimator_template.h"
@@ -106,6 +107,14 @@ TEST(Lanes, DecompositionTrackingIsTheSameAtEveryWidth) {
         if (of_albedo) estimator.control_albedo = {0.4};
       });
   }
+}
+TEST(Lanes, UnbiasedRayMarchingIsTheSameAtEveryWidth) {
+  for (const bool ends : {false, true})
+    for (const char* control : {"majorant", "majorant_minorant"})
+      compare_widths<UnbiasedRayMarching>([&](auto& estimator) {
+        estimator.endpoint_matching = ends;
+        estimator.control = control;
+      });
 }
 TEST(Lanes, RayMarchingIsTheSameAtEveryWidth) {
   for (const char* offset : {"left", "midpoint", "right", "uniform", "stratified"})

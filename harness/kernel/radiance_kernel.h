@@ -27,7 +27,7 @@ struct MediumFrame {
     out.hit = hit;
   }
 
-  // Inlined, since a call's ray is read in pairs of numbers that were stored one by one: each read waits.
+  // Inlined: a call would read the ray in pairs of numbers that were stored one by one, and such a read waits for both stores.
   [[gnu::always_inline]] void look(const Ray& ray, Sight& out) const {
     out.hit = {};
     const Ray local = transformed(ray, to_local);

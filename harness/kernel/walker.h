@@ -185,7 +185,7 @@ class EstimatorWalker final : public Walker<Outside> {
     const Vec3 origin = state.local.origin, direction = state.local.direction;
     const auto look_up = [&](const Walk& walk, const Flight& flight) {
       const Real t = flight.position();
-      // Three numbers, not a point: stored as one they would be read in pairs before they are in memory.
+      // Three numbers instead of a point: a point is read in pairs of numbers, and such a read waits for both stores.
       const Real x = origin.x() + t * direction.x(), y = origin.y() + t * direction.y(), z = origin.z() + t * direction.z();
       if constexpr (Traits::kNeedsShares) {
         const int component = estimator_.component(walk);
