@@ -124,7 +124,10 @@ void hold_in_float(const std::shared_ptr<const Medium>& medium) {
         typename E<Real>::Walk kept;
         flight.start(walked.ray.majorant);
         tracker.init(walk, walked.ray, flight, rng);
-        if constexpr (kKeeps) tracker.init(kept, walked.ray, flight, rng);
+        if constexpr (kKeeps) {
+          Rng unused;
+          tracker.init(kept, walked.ray, flight, unused);
+        }
         int calls = 0;
         const auto force = [&] {
           if (calls++ != at) return;

@@ -75,14 +75,14 @@ struct BidirectionalMis {
     const auto drawn = rng.exponential_and_decay();
     walk.nearer = drawn.decay;
     Distance<Value> depth = flight.depth() + select(walk.backward, -drawn.exponential, drawn.exponential);
-    if (const auto turns = !walk.backward & !(depth < total); !none(turns)) {
+    if (const auto turns = (!walk.backward) & !(depth < total); !none(turns)) {
       const auto anew = rng.exponential_and_decay(turns);
       depth = select(turns, total - anew.exponential, depth);
       walk.nearer = select(turns, anew.decay, walk.nearer);
       walk.weight = select(turns, Value(1), walk.weight);
       walk.backward = walk.backward | turns;
     }
-    return flight.travel_to(depth, (depth < total) & (!walk.backward | (Distance<Value>(0) < depth)));
+    return flight.travel_to(depth, (depth < total) & ((!walk.backward) | (Distance<Value>(0) < depth)));
   }
 
   void consume(AtVertex& walk, const auto&, const auto& at, const Value& extinction, auto&) const {
