@@ -5,27 +5,32 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 
 #include "harness/io/text.h"
 #include "harness/verdict/cell_word.h"
+#include "harness/verdict/verdict.h"
 
 namespace nullmark {
 namespace {
 
-/// What a PASS excludes: |bias| relative to the mean reference, the largest over its tests.
-std::optional<Real> excluded(const CellRecord& record) {
-  if (kind_of(record) != Kind::pass) return std::nullopt;
-  Real largest = 0;
-  for (const TestRecord& test : record.verdict->tests)
-    if (test.channel >= 0 && test.reference != 0)
-      largest = std::max(largest, (test.deterministic() ? test.largest_error : test.epsilon) / std::abs(test.reference));
-  return largest;
-}
+/// Biases that PASSes exclude.
+struct Excluded {
+  Real least = kInfinity, most = 0;
+
+  void add(Real bias) {
+    least = std::min(least, bias);
+    most = std::max(most, bias);
+  }
+
+  std::string text() const {
+    const auto percent = [](Real x) { return x < 1e-6 ? std::string("rounding") : fmt::format("{:.2g} %", 100 * x); };
+    return percent(least) == percent(most) ? percent(most) : fmt::format("{} to {}", percent(least), percent(most));
+  }
+};
 
 struct Part {
   std::size_t cells = 0, pass = 0, fail = 0, errors = 0, open = 0, violated = 0, other = 0;
-  Real least = kInfinity, most = 0;  ///< biases that PASSes exclude
+  Excluded of_means, of_groups;  ///< of the mean over all rays, and over groups of them
 
   void add(const CellRecord& record) {
     ++cells;
@@ -36,16 +41,14 @@ struct Part {
     open += kind == Kind::expected_open || kind == Kind::unexpected_open;
     violated += kind == Kind::violated;
     other += kind == Kind::untested || kind == Kind::not_run;
-    if (const auto bias = excluded(record)) {
-      least = std::min(least, *bias);
-      most = std::max(most, *bias);
-    }
+    if (kind != Kind::pass) return;
+    of_means.add(excluded_bias(*record.verdict));
+    if (const Real bias = excluded_bias_of_groups(*record.verdict); bias > 0) of_groups.add(bias);
   }
 
   std::string bias_text() const {
     if (pass == 0) return "-";
-    const auto percent = [](Real x) { return x < 1e-6 ? std::string("rounding") : fmt::format("{:.2g} %", 100 * x); };
-    return percent(least) == percent(most) ? percent(most) : fmt::format("{} to {}", percent(least), percent(most));
+    return of_means.text() + (of_groups.most > 0 ? "; of groups of rays " + of_groups.text() : "");
   }
 };
 

@@ -82,6 +82,15 @@ Real margin_of(const TestRecord& test) {
   return test.deterministic() ? std::max(test.allowed_error(), test.largest_error) : test.epsilon;
 }
 
+/// The largest over tests of means, of all rays or of groups of them, relative to the reference.
+Real largest_margin(const VerdictRecord& verdict, bool of_groups) {
+  Real largest = 0;
+  for (const TestRecord& test : verdict.tests)
+    if (test.channel >= 0 && (test.group >= 0) == of_groups && test.reference != 0)
+      largest = std::max(largest, margin_of(test) / std::abs(test.reference));
+  return largest;
+}
+
 /// The test that PASS says least of, relative to its reference; `error` is what is small.
 std::string within_text(const std::vector<const TestRecord*>& tests, const char* error) {
   const TestRecord* widest = nullptr;
@@ -222,13 +231,8 @@ void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs, con
   conclude(verdict, found, outputs, range);
 }
 
-Real excluded_bias(const VerdictRecord& verdict) {
-  Real largest = 0;
-  for (const TestRecord& test : verdict.tests)
-    if (test.channel >= 0 && test.group < 0 && test.reference != 0)
-      largest = std::max(largest, margin_of(test) / std::abs(test.reference));
-  return largest;
-}
+Real excluded_bias(const VerdictRecord& verdict) { return largest_margin(verdict, false); }
+Real excluded_bias_of_groups(const VerdictRecord& verdict) { return largest_margin(verdict, true); }
 
 bool tests_walks(const VerdictRecord& verdict) {
   return std::any_of(verdict.laws.begin(), verdict.laws.end(),

@@ -26,6 +26,8 @@ void decide(VerdictRecord& verdict, const std::vector<std::string>& outputs = {}
 
 /// What a PASS excludes: |mean error| over all rays, relative to the reference; the largest over the tests of means.
 Real excluded_bias(const VerdictRecord& verdict);
+/// The same over groups of rays; 0 where none is tested.
+Real excluded_bias_of_groups(const VerdictRecord& verdict);
 
 /// Whether laws of walks were tested.  "replay" and "variance" are laws of samples and do not count.
 bool tests_walks(const VerdictRecord& verdict);

@@ -171,7 +171,9 @@ TEST(Verdict, APassProvesWhatTheWidestOfItsTestsExcludes) {
   EXPECT_EQ(verdict.unbiased, Outcome::pass);
   EXPECT_EQ(verdict.proves, "|bias| < 2 % of the mean");
   EXPECT_DOUBLE_EQ(excluded_bias(verdict), 0.02);
+  EXPECT_DOUBLE_EQ(excluded_bias_of_groups(verdict), 0.08);
   verdict = verdict_of({same});
+  EXPECT_EQ(excluded_bias_of_groups(verdict), 0);
   EXPECT_DOUBLE_EQ(excluded_bias(verdict), (same.rounding + same.reference_error) / 0.5);
 }
 
