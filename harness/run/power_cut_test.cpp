@@ -91,9 +91,17 @@ TEST_F(PowerCut, OfAResumedRun) {
   DiskFiles torn;
   const std::string journal = Journal::path_for(kResults);
   const auto lines = [&] { return std::count(torn[journal].begin(), torn[journal].end(), '\n'); };
+  int whole = 0;
   for (int step = 1; lines() < 2 || torn.at(journal).back() == '\n'; ++step) {
     put({});
-    ASSERT_EQ(Process(folder_, {"run", "few.json", "-o", kResults}, faulty("tear", step)).wait(), 128 + SIGKILL) << "never torn";
+    const int ended = Process(folder_, {"run", "few.json", "-o", kResults}, faulty("tear", step)).wait();
+    if (ended == 0) {
+      // Cells that were done together were written together, and the cut fell between them: another run writes them apart.
+      ASSERT_LT(++whole, 100) << "never torn";
+      step = 0;
+      continue;
+    }
+    ASSERT_EQ(ended, 128 + SIGKILL);
     torn = files();
   }
   EXPECT_GT(survive_every_cut(torn, "--resume"), 15u);

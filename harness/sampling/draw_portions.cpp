@@ -262,12 +262,17 @@ std::optional<Portions> draw_portions(const Cell& cell, const Scene& scene, cons
   });
   const ChunkSampler sampler(cell, scene, kernel, targets, span, plan, kept);
   std::atomic<std::size_t> done = 0;
-  tbb::parallel_for(std::size_t{0}, drawn.size(), [&](std::size_t i) {
+  const auto draw = [&](std::size_t i) {
     if (stops()) return;
     const InFlight named(cell.name);
     sampler.sample(cut.chunks()[drawn[i]], scratch.local(), parts[i], stops);
     progress(static_cast<double>(++done) / static_cast<double>(drawn.size()));
-  });
+  };
+  // The kept samples begin with the first of the cell.  A tracker that learns from samples is found out by them only if no others
+  // were drawn before.
+  const std::size_t alone = span.keep && !drawn.empty() ? 1 : 0;
+  if (alone > 0) draw(0);
+  tbb::parallel_for(alone, drawn.size(), draw);
   if (stopped) return std::nullopt;
 
   Portions portions = joined(cut, drawn, parts);
