@@ -40,6 +40,8 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     return 2048 / sizeof(T);
   }();
 
+  static_assert(kBlock % N == 0, "a tracker's Kept::kTogether is a multiple of 16, so that a block has whole registers");
+
   /// N walks.  All registers have the same lane order, so one permutation compacts them.
   struct Walks {
     LanePlace<T, N> place;
