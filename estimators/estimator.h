@@ -58,7 +58,7 @@ namespace nullmark {
 //   Value expected(const Value& tau, const RayData&) const
 //       a target other than exp(-tau), e.g. a factor of T
 //   bool flies_once(int channels) const
-//       false if a sample takes several flights, or collides without a lookup; default true
+//       false if a sample takes several flights, or collides without a lookup; its walks are then not in lanes; default true
 //   int real_collisions(const Walk&, const RayData&) const
 //       tentative collisions that ended a walk; default 0
 //   Theory theory(const RayData&, const RayProfile&, int channel, Quantity) const

@@ -24,47 +24,47 @@ struct HeroWavelengthTracking {
   static constexpr const char* kSource = "Wilkie et al. 2014; Miller, Georgiev, Jarosz 2019";
   static constexpr SampleRange kRange = std::is_same_v<Value, Real> ? SampleRange::unit : SampleRange::non_negative;
   static constexpr bool kNeedsBound = true;
+  static constexpr bool kLanes = true;
 
   Guarantee claim(Quantity) const { return Guarantee::unbiased; }
 
+  using Number = Distance<Value>;
+
   struct Walk {
-    int hero = 0;
+    Number hero;                 ///< the channel, drawn at the first collision; -1 before it
     Value contribution, chance;  ///< f and p, over avg p
-    EventKind kind = EventKind::escape;
+    EventChoice<Truth<Value>> end;
   };
 
-  void init(Walk& walk, const MediumRay<Value>& ray, Flight&, auto&) const {
-    walk = {-1, ray.value(1), ray.throughput / average(ray.throughput), EventKind::escape};
+  void init(Walk& walk, const auto& ray, auto&, auto&) const {
+    walk = {Number(-1), ray.value(1), ray.throughput / average(ray.throughput), {}};
   }
 
-  bool propose(Walk& walk, const MediumRay<Value>&, Flight& flight, auto& rng) const {
-    return walk.kind == EventKind::escape && flight.next(rng);
-  }
+  auto propose(Walk& walk, const auto&, auto& flight, auto& rng) const { return flight.next(rng, !walk.end.ends()); }
 
-  void consume(Walk& walk, const MediumRay<Value>& ray, const Flight& at, const Value& extinction, auto& rng) const {
-    if (walk.hero < 0) walk.hero = choose(walk.chance, ray.channels, rng);
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
+    if (at.lookups() == 1) walk.hero = choose(walk.chance, ray.channels, rng);
     const Coefficients<Value> mu = ray.coefficients(Value(smaller(extinction, at.rate())), at.position(), at.rate());
-    const Value absorb = ray.draws_absorption ? mu.absorb : ray.value(0);
-    const EventKind kind =
-        choose_event(rng.uniform(), channel(absorb, walk.hero), channel(mu.scatter, walk.hero), channel(mu.null, walk.hero));
-    walk.kind = kind;
-    const Value &own = kind == EventKind::absorb ? absorb : mu.of(kind), sum = absorb + mu.scatter + mu.null;
-    walk.contribution *= own / at.rate();
-    walk.chance *= select(sum > 0, Value(own / sum), ray.value(0));
-    const Real mean = average(walk.chance);
-    walk.contribution = mean > 0 ? Value(walk.contribution / mean) : ray.value(0);
-    walk.chance = mean > 0 ? Value(walk.chance / mean) : ray.value(0);
+    const Value absorb = ray.draws_absorption ? mu.absorb : Value(ray.value(0));
+    walk.end = choose_event(Number(rng.uniform()), of_hero(absorb, walk), of_hero(mu.scatter, walk), of_hero(mu.null, walk));
+    const Value own = walk.end.of(absorb, mu.scatter, mu.null), sum = absorb + mu.scatter + mu.null;
+    const Value contribution = walk.contribution * (own / at.rate());
+    const Value chance = walk.chance * select(sum > 0, Value(own / sum), Value(ray.value(0)));
+    const Number mean = average(chance);
+    const auto any = mean > Number(0);
+    walk.contribution = select(any, Value(contribution / mean), Value(ray.value(0)));
+    walk.chance = select(any, Value(chance / mean), Value(ray.value(0)));
   }
 
-  Value result(const Walk& walk, const MediumRay<Value>& ray) const {
-    return walk.kind == EventKind::escape ? walk.contribution : ray.value(0);
+  Value result(const Walk& walk, const auto& ray) const {
+    return select(walk.end.ends(), Value(ray.value(0)), walk.contribution);
   }
 
   Event<Value> event(const Walk& walk, const MediumRay<Value>&, const Flight& at) const {
-    return {walk.kind, at.position(), walk.contribution};
+    return {walk.end.kind, at.position(), walk.contribution};
   }
 
-  int real_collisions(const Walk& walk, const MediumRay<Value>&) const { return walk.kind != EventKind::escape; }
+  auto real_collisions(const Walk& walk, const auto&) const { return walk.end.ends(); }
 
   /// Where the majorant is violated the walk sees min(mu, mub).
   Theory theory(const MediumRay<Value>& ray, const RayProfile& smooth, int c, Quantity) const {
@@ -102,12 +102,23 @@ struct HeroWavelengthTracking {
   }
 
  private:
-  static int choose(const Value& chance, int channels, auto& rng) {
-    if (channels == 1) return 0;
-    Real left = rng.uniform() * channels;
-    int hero = 0;
-    while (hero + 1 < channels && !(left < channel(chance, hero))) left -= channel(chance, hero++);
+  /// A channel in proportion to its chance.
+  static Number choose(const Value& chance, int channels, auto& rng) {
+    Number hero(0);
+    if (channels == 1) return hero;
+    Number left = Number(rng.uniform()) * Number(channels);
+    for (int c = 0; c + 1 < channels; ++c) {
+      const auto passed = (hero == Number(c)) & !(left < channel(chance, c));
+      left = select(passed, Number(left - channel(chance, c)), left);
+      hero = select(passed, Number(c + 1), hero);
+    }
     return hero;
+  }
+
+  static Number of_hero(const Value& x, const Walk& walk) {
+    Number own = channel(x, 0);
+    for (int c = 1; c < channel_count(x); ++c) own = select(walk.hero == Number(c), Number(channel(x, c)), own);
+    return own;
   }
 
   static std::optional<Real> variance_of_constant(const MediumRay<Value>& ray, const RayProfile& profile, int c) {

@@ -25,6 +25,7 @@ struct NullCollisionTracking {
   static constexpr const char* kSource = "Galtier et al. 2013; Kutz, Habel, Li, Novak 2017, Sec. 3";
   static constexpr SampleRange kRange = std::is_same_v<Value, Real> ? SampleRange::unit : SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kLanes = true;
 
   std::string probabilities = "proportional", roulette = "one";
   Real absorb = 0.25, scatter = 0.25, null = 0.5;
@@ -63,32 +64,34 @@ struct NullCollisionTracking {
     ray.three = roulette == "three";
   }
 
+  using Number = Distance<Value>;
+
   struct Walk {
     Value weight;
-    EventKind kind = EventKind::escape;
+    EventChoice<Truth<Value>> end;
   };
 
-  void init(Walk& walk, const RayData& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape}; }
+  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(1), {}}; }
 
-  bool propose(Walk& walk, const RayData&, Flight& flight, auto& rng) const {
-    return walk.kind == EventKind::escape && flight.next(rng);
-  }
+  auto propose(Walk& walk, const auto&, auto& flight, auto& rng) const { return flight.next(rng, !walk.end.ends()); }
 
-  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
     const Coefficients<Value> mu = ray.coefficients(extinction, at.position(), at.rate());
     const Chances chance = chances(ray, mu);
-    const std::optional<EventKind> kind =
-        ray.three ? three_roulettes(chance, rng) : choose_event(rng.uniform(), chance.absorb, chance.scatter, chance.null);
-    walk.kind = kind.value_or(EventKind::absorb);
-    const Real p = kind ? chance.of(*kind) : 0;
-    walk.weight = p > 0 ? Value(walk.weight * mu.of(*kind) / (at.rate() * p)) : ray.value(0);
+    const Number u = rng.uniform();
+    auto lost = u < Number(0);
+    walk.end = ray.three ? three_roulettes(chance, u, rng, lost) : choose_event(u, chance.absorb, chance.scatter, chance.null);
+    const Number p = select(lost, Number(0), walk.end.of(chance.absorb, chance.scatter, chance.null));
+    walk.weight = select(p > Number(0), Value(walk.weight * mu.of(walk.end) / (at.rate() * p)), Value(ray.value(0)));
   }
 
-  Value result(const Walk& walk, const RayData& ray) const { return walk.kind == EventKind::escape ? walk.weight : ray.value(0); }
+  Value result(const Walk& walk, const auto& ray) const { return select(walk.end.ends(), Value(ray.value(0)), walk.weight); }
 
-  Event<Value> event(const Walk& walk, const RayData&, const Flight& at) const { return {walk.kind, at.position(), walk.weight}; }
+  Event<Value> event(const Walk& walk, const RayData&, const Flight& at) const {
+    return {walk.end.kind, at.position(), walk.weight};
+  }
 
-  int real_collisions(const Walk& walk, const RayData&) const { return walk.kind != EventKind::escape; }
+  auto real_collisions(const Walk& walk, const auto&) const { return walk.end.ends(); }
 
   Theory theory(const RayData& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
@@ -117,12 +120,12 @@ struct NullCollisionTracking {
       for (int l = 0; l < ray.channels; ++l) channel(extinction, l) = profile.nodes(l)[j].extinction;
       const Coefficients<Value> mu = ray.coefficients(extinction, profile.nodes(c)[j].t, mub);
       const Chances chance = mub > 0 ? chances(ray, mu) : Chances{0, 0, 0};
-      const auto second = [&](EventKind kind) {
-        const Real own = channel(mu.of(kind), c), p = chance.of(kind);
+      const auto second = [&](const Value& coefficient, Real p) {
+        const Real own = channel(coefficient, c);
         return p > 0 ? own * own / (mub * p) : 0;
       };
-      growth.push_back(second(EventKind::escape) - mub);
-      collisions.push_back(second(EventKind::absorb) + second(EventKind::scatter));
+      growth.push_back(second(mu.null, chance.null) - mub);
+      collisions.push_back(second(mu.absorb, chance.absorb) + second(mu.scatter, chance.scatter));
     }
     Theory theory = this->theory(ray, smooth, c, Quantity::free_path);
     theory.variance = weight_variance(profile, c, growth, collisions);
@@ -131,33 +134,33 @@ struct NullCollisionTracking {
 
  private:
   struct Chances {
-    Real absorb, scatter, null;  ///< of each event in all
-
-    Real of(EventKind kind) const { return kind == EventKind::absorb ? absorb : kind == EventKind::scatter ? scatter : null; }
+    Number absorb, scatter, null;  ///< of each event in all
   };
 
   /// Without absorption as an event its chance goes to the others.
-  Chances chances(const RayData& ray, const Coefficients<Value>& mu) const {
-    if (ray.fixed && ray.three) {
-      const Real a = ray.draws_absorption ? absorb : 0;
-      return {a, (1 - a) * scatter, (1 - a) * (1 - scatter) * null};
+  Chances chances(const auto& ray, const Coefficients<Value>& mu) const {
+    const Real a = ray.draws_absorption ? absorb : 0;
+    if (ray.fixed && ray.three) return {a, (1 - a) * scatter, (1 - a) * (1 - scatter) * null};
+    Chances chance = {a, scatter, null};
+    if (!ray.fixed) {
+      chance = {average(magnitude(mu.absorb)), average(magnitude(mu.scatter)), average(magnitude(mu.null))};
+      if (!ray.draws_absorption) chance.absorb = 0;
     }
-    Chances chance = {absorb, scatter, null};
-    if (!ray.fixed) chance = {average(magnitude(mu.absorb)), average(magnitude(mu.scatter)), average(magnitude(mu.null))};
-    if (!ray.draws_absorption) chance.absorb = 0;
-    const Real sum = chance.absorb + chance.scatter + chance.null;
-    if (!(sum > 0)) return {0, 0, 0};  // absorption, left to weights, takes all
-    return {chance.absorb / sum, chance.scatter / sum, chance.null / sum};
+    const Number sum = chance.absorb + chance.scatter + chance.null;
+    const auto any = sum > Number(0);  // else absorption, left to weights, takes all
+    const auto share = [&](const Number& own) { return select(any, Number(own / sum), Number(0)); };
+    return {share(chance.absorb), share(chance.scatter), share(chance.null)};
   }
 
-  /// Nothing where none survives.
-  static std::optional<EventKind> three_roulettes(const Chances& chance, auto& rng) {
-    if (rng.uniform() < chance.absorb) return EventKind::absorb;
-    Real left = 1 - chance.absorb;
-    if (rng.uniform() * left < chance.scatter) return EventKind::scatter;
-    left -= chance.scatter;
-    if (rng.uniform() * left < chance.null) return EventKind::escape;
-    return std::nullopt;
+  /// `u` is the first of their random numbers.  A walk that survives none is lost: it ends, as if absorbed.
+  static auto three_roulettes(const Chances& chance, const Number& u, auto& rng, auto& lost) {
+    const auto absorbs = u < chance.absorb;
+    Number left = 1 - chance.absorb;
+    const auto scatters = (rng.uniform_where(!absorbs) * left < chance.scatter) & !absorbs;
+    left = left - chance.scatter;
+    const auto neither = !(absorbs | scatters);
+    lost = neither & !(rng.uniform_where(neither) * left < chance.null);
+    return EventChoice<Truth<Value>>::from(absorbs | lost, scatters);
   }
 };
 

@@ -39,6 +39,7 @@ struct SpectralTracking {
   static constexpr const char* kSource = "Kutz, Habel, Li, Novak 2017, Sec. 5";
   static constexpr SampleRange kRange = std::is_same_v<Value, Real> ? SampleRange::unit : SampleRange::non_negative;
   static constexpr bool kNeedsBound = false;
+  static constexpr bool kLanes = true;
 
   SpectralScheme scheme = SpectralScheme::history_aware_average;
   SpectralControl control = SpectralControl::none;
@@ -100,48 +101,44 @@ struct SpectralTracking {
     }
   }
 
+  using Number = Distance<Value>;
+
   struct Walk {
     Value weight;
-    EventKind kind = EventKind::escape;
-    Real lookup_chance = 1;  ///< that a tentative collision here is not the control's
-    bool looked_up = false;
+    Number lookup_chance;  ///< that a tentative collision here is not the control's
+    EventChoice<Truth<Value>> end;
+    Truth<Value> looked_up = false;
   };
 
-  void init(Walk& walk, const RayData& ray, Flight&, auto&) const { walk = {ray.value(1), EventKind::escape, 1, false}; }
+  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(1), Number(1), {}, false}; }
 
-  bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
-    if (walk.kind != EventKind::escape || !flight.next(rng)) return false;
-    if (ray.control.empty()) return true;
-    const Control& split = ray.control[flight.piece()];
-    walk.lookup_chance = lookup_chance(ray, walk.weight, flight.rate(), flight.piece());
-    const Real u = rng.uniform();
-    if (u < walk.lookup_chance) return true;
-    const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, split.absorb) : 0,
-               scatter = measure(ray, walk.weight, split.scatter);
-    const Real chance = 1 - walk.lookup_chance;
-    walk.kind = choose_event((u - walk.lookup_chance) / chance, absorb, scatter, 0);
-    take(walk, ray, walk.kind == EventKind::absorb ? split.absorb : split.scatter, flight.rate() * chance,
-         walk.kind == EventKind::absorb ? absorb : scatter, absorb + scatter);
-    return false;
+  auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
+    const auto inside = flight.next(rng, !walk.end.ends());
+    // With a control flights and lookups part, and walks are not in lanes.
+    if constexpr (!kSideBySide<Value>)
+      if (inside && !ray.control.empty()) return looks_up(walk, ray, flight, rng);
+    return inside;
   }
 
-  void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
+  void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
     Coefficients<Value> mu = ray.coefficients(extinction, at.position(), at.rate());
-    if (!ray.control.empty()) mu = residual(ray, mu, at.piece());
-    const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : 0,
-               scatter = measure(ray, walk.weight, mu.scatter), null = measure(ray, walk.weight, mu.null);
-    const EventKind kind = choose_event(rng.uniform(), absorb, scatter, null);
-    walk.kind = kind;
-    walk.looked_up = kind != EventKind::escape;
-    const Real own = kind == EventKind::absorb ? absorb : kind == EventKind::scatter ? scatter : null;
-    take(walk, ray, mu.of(kind), at.rate() * walk.lookup_chance, own, absorb + scatter + null);
+    if constexpr (!kSideBySide<Value>)
+      if (!ray.control.empty()) mu = residual(ray, mu, at.piece());
+    const Number absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : Number(0),
+                 scatter = measure(ray, walk.weight, mu.scatter), null = measure(ray, walk.weight, mu.null);
+    const auto event = choose_event(Number(rng.uniform()), absorb, scatter, null);
+    walk.end = event;
+    walk.looked_up = event.ends();
+    take(walk, ray, mu.of(event), at.rate() * walk.lookup_chance, event.of(absorb, scatter, null), absorb + scatter + null);
   }
 
-  Value result(const Walk& walk, const RayData& ray) const { return walk.kind == EventKind::escape ? walk.weight : ray.value(0); }
+  Value result(const Walk& walk, const auto& ray) const { return select(walk.end.ends(), Value(ray.value(0)), walk.weight); }
 
-  Event<Value> event(const Walk& walk, const RayData&, const Flight& at) const { return {walk.kind, at.position(), walk.weight}; }
+  Event<Value> event(const Walk& walk, const RayData&, const Flight& at) const {
+    return {walk.end.kind, at.position(), walk.weight};
+  }
 
-  int real_collisions(const Walk& walk, const RayData&) const { return walk.looked_up; }
+  auto real_collisions(const Walk& walk, const auto&) const { return walk.looked_up; }
 
   Theory theory(const RayData& ray, const RayProfile& smooth, int c, Quantity) const {
     const RayProfile profile = cut_at_levels(smooth, ray.majorant, {&ray.majorant});
@@ -184,8 +181,24 @@ struct SpectralTracking {
     return all;
   }
 
+  /// Whether a tentative collision is to be looked up; otherwise it is the control's, and the walk is done.
+  static bool looks_up(Walk& walk, const RayData& ray, const Flight& flight, auto& rng) {
+    const Control& split = ray.control[flight.piece()];
+    walk.lookup_chance = lookup_chance(ray, walk.weight, flight.rate(), flight.piece());
+    const Real u = rng.uniform();
+    if (u < walk.lookup_chance) return true;
+    const Real absorb = ray.draws_absorption ? measure(ray, walk.weight, split.absorb) : 0,
+               scatter = measure(ray, walk.weight, split.scatter);
+    const Real chance = 1 - walk.lookup_chance;
+    const auto event = choose_event((u - walk.lookup_chance) / chance, absorb, scatter, Real{0});
+    walk.end = event;
+    take(walk, ray, event.of(split.absorb, split.scatter, split.scatter), flight.rate() * chance,
+         event.of(absorb, scatter, scatter), absorb + scatter);
+    return false;
+  }
+
   /// R_k of the scheme.
-  static Real measure(const RayData& ray, const Value& weight, const Value& coefficient) {
+  [[gnu::always_inline]] static Number measure(const auto& ray, const Value& weight, const Value& coefficient) {
     const Value x = magnitude(ray.by_history ? Value(ray.throughput * weight * coefficient) : coefficient);
     return ray.by_maximum ? largest(x) : average(x);
   }
@@ -206,13 +219,14 @@ struct SpectralTracking {
   }
 
   /// w_l *= mu_k,l/(rate P_k), with P_k = own / sum; nothing is left where absorption, not an event, took all.
-  static void take(Walk& walk, const RayData& ray, const Value& coefficient, Real rate, Real own, Real sum) {
-    if (!(own > 0))
-      walk.weight = ray.value(0);
-    else if (own * rate < least_normal(rate))  // of extinctions near the least number the product is none
-      walk.weight *= coefficient / own * (sum / rate);
-    else
-      walk.weight *= coefficient * (sum / (own * rate));
+  [[gnu::always_inline]] static void take(Walk& walk, const auto& ray, const Value& coefficient, const Number& rate,
+                                          const Number& own, const Number& sum) {
+    const Number chance = own * rate;
+    Value factor = coefficient * (sum / chance);
+    const auto tiny = chance < least_normal(rate);  // of extinctions near the least number the product is none
+    if (!none(tiny)) [[unlikely]]
+      factor = select(tiny, Value(coefficient / own * (sum / rate)), factor);
+    walk.weight = select(own > Number(0), Value(walk.weight * factor), Value(ray.value(0)));
   }
 
   /// Chances of a lookup and of a null collision at a point, and the null collision's factor of the weights.

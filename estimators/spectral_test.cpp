@@ -196,8 +196,8 @@ TEST(Spectral, HistoryAwareAverageKeepsTheMeanWeightOverAMillionPaths) {
         worst_mean = std::max(worst_mean, std::abs(throughput.mean() - 1));
         largest_weight = std::max(largest_weight, throughput.maxCoeff());
         most_events = std::max(most_events, events);
-        if (walk.kind == EventKind::absorb) break;
-        if (walk.kind == EventKind::scatter) {
+        if (walk.end.kind == EventKind::absorb) break;
+        if (walk.end.kind == EventKind::scatter) {
           walked->ray.throughput = throughput;
           walked->estimator.init(walk, walked->ray, flight, rng);
         }

@@ -21,10 +21,9 @@ struct PlantedSpectralSum : SpectralTracking<Value> {
   void consume(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction, auto& rng) const {
     const Coefficients<Value> mu(extinction, ray.albedo, at.rate());
     const Real u = rng.uniform() * at.rate(), absorb = largest(mu.absorb), scatter = largest(mu.scatter);
-    const EventKind kind = u < absorb ? EventKind::absorb : u < absorb + scatter ? EventKind::scatter : EventKind::escape;
-    walk.kind = kind;
-    walk.looked_up = kind != EventKind::escape;
-    walk.weight *= mu.of(kind) / largest(mu.of(kind));
+    walk.end = EventChoice<bool>::from(u < absorb, u < absorb + scatter);
+    walk.looked_up = walk.end.ends();
+    walk.weight *= mu.of(walk.end) / largest(mu.of(walk.end));
   }
 };
 

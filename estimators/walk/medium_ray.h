@@ -38,10 +38,12 @@ struct MediumRay {
   /// mu_s / mu at a distance.
   Value albedo_at(Real t) const { return albedo_field ? read_albedo(t) : albedo; }
 
-  /// mu_a, mu_s and mub - mu at a distance.
-  Coefficients<Value> coefficients(const Value& extinction, Real t, Real mub) const {
-    if (albedo_field) return {extinction, read_albedo(t), mub};
-    return {extinction, albedo, mub};
+  /// mu_a, mu_s and mub - mu at a distance, or at those of many walks.
+  template <class Extinction>
+  Coefficients<Extinction> coefficients(const Extinction& extinction, const Distance<Extinction>& t,
+                                        const Distance<Extinction>& mub) const {
+    if (albedo_field) return {extinction, values_at<Extinction>(t, [&](Real x) { return read_albedo(x); }), mub};
+    return {extinction, Extinction(albedo), mub};
   }
 
   void set_albedo(const Value& most, const AlbedoField* field, const Ray& world) {

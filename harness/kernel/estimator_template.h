@@ -62,7 +62,7 @@ class EstimatorTemplate final : public EstimatorSource {
     if constexpr (Traits::kCheck) grey_.check(medium);
   }
   std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64, bool lanes = true) const override {
-    if (channels == 1 && lanes) {
+    if (channels == 1 && lanes && shares_walk(1)) {
       if constexpr (kInLanes) {
         if (precision == Precision::float32) return std::make_unique<LaneKernel<Estimator, float>>(grey_, single_);
         return std::make_unique<LaneKernel<Estimator, Real>>(grey_, lanes_);
@@ -103,7 +103,7 @@ class EstimatorTemplate final : public EstimatorSource {
     return E::kRange;
   }
 
-  /// Whether all channels take the same flights.
+  /// Whether one flight serves all channels and each of its collisions is a lookup, as in lanes.
   bool shares_walk(int channels) const {
     if constexpr (Traits::kFliesOnce) return grey_.flies_once(channels);
     return true;

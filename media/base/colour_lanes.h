@@ -126,6 +126,11 @@ class LaneColours {
     for (std::size_t c = 1; c < C; ++c) most = larger(most, a[c]);
     return most;
   }
+  friend Pack average(const LaneColours& a) {
+    Pack sum(0);
+    for (std::size_t c = 0; c < C; ++c) sum += a[c];
+    return sum / Pack(C);
+  }
   friend Pack smallest(const LaneColours& a) {
     Pack least = a[0];
     for (std::size_t c = 1; c < C; ++c) least = smaller(least, a[c]);
@@ -156,6 +161,14 @@ template <class T, std::size_t N, std::size_t C>
 Lanes<T, N> channel(const LaneColours<T, N, C>& x, std::size_t c) {
   return x[c];
 }
+template <class T, std::size_t N>
+int channel_count(const Lanes<T, N>&) {
+  return 1;
+}
+template <class T, std::size_t N, std::size_t C>
+int channel_count(const LaneColours<T, N, C>&) {
+  return static_cast<int>(C);
+}
 
 template <std::size_t N, std::size_t C>
 inline constexpr bool kInFloat<LaneColours<float, N, C>> = true;
@@ -166,6 +179,23 @@ struct Walking<LaneColours<T, N, C>> {
   using Truth = LaneTruth<T, N>;
   using OneSample = SpectrumOf<static_cast<int>(C)>;
 };
+
+template <class Value, class T, std::size_t N, class Function>
+Value values_at(const Lanes<T, N>& t, const Function& f) {
+  if constexpr (requires { Value::kChannels; }) {
+    T values[Value::kChannels][N];
+    for (std::size_t k = 0; const T x : numbers(t)) {
+      const auto one = f(static_cast<Real>(x));
+      for (std::size_t c = 0; c < Value::kChannels; ++c) values[c][k] = static_cast<T>(one[static_cast<Eigen::Index>(c)]);
+      ++k;
+    }
+    Value result;
+    for (std::size_t c = 0; c < Value::kChannels; ++c) result[c] = Lanes<T, N>::load(values[c]);
+    return result;
+  } else {
+    return one_by_one(t, f);
+  }
+}
 
 /// table[index] per lane.
 template <class T, std::size_t N, int C>

@@ -148,6 +148,12 @@ using Truth = typename Walking<Value>::Truth;
 template <class Value>
 using OneSample = typename Walking<Value>::OneSample;
 
+/// f(t), which is a Value of one sample, for each sample's t.
+template <class Value, class Function>
+Value values_at(Real t, const Function& f) {
+  return f(t);
+}
+
 /// Whether a Value is of several samples.
 template <class Value>
 inline constexpr bool kSideBySide = !std::is_same_v<Value, OneSample<Value>>;
@@ -158,6 +164,10 @@ inline constexpr bool kInFloat = false;
 
 /// `a` where `yes`, else `b`.
 inline Real select(bool yes, Real a, Real b) { return yes ? a : b; }
+template <int width>
+SpectrumOf<width> select(bool yes, const SpectrumOf<width>& a, const SpectrumOf<width>& b) {
+  return yes ? a : b;
+}
 template <class Condition, class A, class B>
 Evaluated<A> select(const Colours<Condition>& yes, const Colours<A>& a, const Colours<B>& b) {
   return yes.select(a, b);
