@@ -47,6 +47,9 @@ TEST(LaneColours, ParametersChangeNothingOfThat) {
     expect_plain_samples({"residual_delta", {{"control", control}}, {}, {}}, kThree);
   }
   expect_plain_samples({"unbiased_ray_marching", {{"endpoint_matching", true}}, {}, {}}, kThree);
+  for (const char* scheme : {"maximum", "average", "history_aware_maximum"})
+    expect_plain_samples({"spectral", {{"scheme", scheme}}, {}, {}}, kFour);
+  expect_plain_samples({"null_collision", {{"probabilities", "fixed"}, {"roulette", "three"}}, {}, {}}, kThree);
   for (const char* control : {"linear", "exponential"})
     expect_plain_samples({"residual_ratio", {{"control", control}, {"value", .5}, {"value_end", 2.}}, {}, {}}, kFour);
 }
@@ -58,6 +61,7 @@ TEST(LaneColours, TheOthersTakeThePlainLoop) {
   };
   EXPECT_TRUE(in_lanes({"delta", {}, {}, {}}, 4));
   EXPECT_FALSE(in_lanes({"delta", {{"walks", "separate"}}, {}, {}}, 4));
+  for (const int channels : {1, 4}) EXPECT_FALSE(in_lanes({"spectral", {{"control", "minimum"}}, {}, {}}, channels));
   EXPECT_FALSE(in_lanes({"ratio", {}, {}, {}}, 2));
   EXPECT_FALSE(in_lanes({"ratio", {}, {}, {}}, 16));
   EXPECT_EQ(make_estimator({"ratio", {}, {}, {}})->kernel(4, Precision::float32), nullptr);

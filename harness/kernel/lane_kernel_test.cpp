@@ -4,6 +4,7 @@
 
 #include "estimators/analog_decomposition.h"
 #include "estimators/delta.h"
+#include "estimators/hero_wavelength.h"
 #include "estimators/jackknife.h"
 #include "estimators/majorant_guided_ratio.h"
 #include "estimators/marching_inversion.h"
@@ -11,6 +12,7 @@
 #include "estimators/mis_unidirectional.h"
 #include "estimators/next_flight_delta.h"
 #include "estimators/next_flight_ratio.h"
+#include "estimators/null_collision.h"
 #include "estimators/p_series_cmf.h"
 #include "estimators/p_series_cumulative.h"
 #include "estimators/p_series_next_flight.h"
@@ -21,6 +23,7 @@
 #include "estimators/ray_marching.h"
 #include "estimators/residual_delta.h"
 #include "estimators/residual_ratio.h"
+#include "estimators/spectral.h"
 #include "estimators/telescoping.h"
 #include "estimators/telescoping_difference.h"
 #include "estimators/unbiased_ray_marching.h"
@@ -107,6 +110,17 @@ TEST(Lanes, DecompositionTrackingIsTheSameAtEveryWidth) {
         if (of_albedo) estimator.control_albedo = {0.4};
       });
   }
+}
+TEST(Lanes, TrackersThatChooseAmongEventsAreTheSameAtEveryWidth) {
+  compare_widths<HeroWavelengthTracking>(kAsItIs);
+  for (const auto scheme : {SpectralScheme::maximum, SpectralScheme::history_aware_average})
+    compare_widths<SpectralTracking>([&](auto& estimator) { estimator.scheme = scheme; });
+  for (const char* roulette : {"one", "three"})
+    for (const char* probabilities : {"proportional", "fixed"})
+      compare_widths<NullCollisionTracking>([&](auto& estimator) {
+        estimator.roulette = roulette;
+        estimator.probabilities = probabilities;
+      });
 }
 TEST(Lanes, UnbiasedRayMarchingIsTheSameAtEveryWidth) {
   for (const bool ends : {false, true})

@@ -9,6 +9,7 @@
 
 #include "harness/kernel/kernel.h"
 #include "harness/testing/built_media.h"
+#include "media/base/albedo.h"
 #include "media/base/channels.h"
 #include "media/cosine.h"
 #include "media/exponential_cube.h"
@@ -34,6 +35,7 @@ struct Case {
   std::shared_ptr<const Medium> medium;
   std::shared_ptr<const MajorantStructure> majorant;
   Ray world;
+  std::shared_ptr<const AlbedoField> albedo = nullptr;
 };
 
 /// Voxels 0 to 31 on each axis, a smooth blob with a vacuum around it.
@@ -95,6 +97,10 @@ inline std::vector<Case> cases(const std::vector<Real>& spectrum = {}) {
   add("volume along x", volume(), {{-1, 0.4, 0.6}, {1, 0, 0}, 0, kInfinity});
   add("volume along -y", volume(), {{0.4, 2, 0.6}, {0, -1, 0}, 0, kInfinity});
   add("volume along z", volume(), {{0.6, 0.4, -1}, {0, 0, 1}, 0, kInfinity});
+  all.push_back(all.front());
+  all.back().name = "constant, of an albedo that varies";
+  cosine.target_depth = 0.5;
+  all.back().albedo = std::make_shared<FieldAlbedo>(built(cosine), all.back().medium->channels());
   if (!spectrum.empty()) {
     std::vector<std::shared_ptr<const Medium>> channels = {built(bump), built(hole), constant(2), built(cosine)};
     channels.resize(spectrum.size());
@@ -114,6 +120,10 @@ inline Sampled sampled(const Kernel& kernel, const Case& with, std::size_t count
   context.world.end = context.local.end;
   context.bounds.start(*with.majorant, context.world, context.local);
   if (kernel.needs_optical_depth()) context.exact_depth = Spectrum::Constant(with.medium->channels(), 1.25);
+  if (with.albedo) {
+    context.albedo = with.albedo->most(with.medium->channels());
+    context.albedo_field = with.albedo.get();
+  }
   kernel.begin_ray(*workspace, *with.medium, extrema, context);
   Sampled out;
   SampleBlock block;
