@@ -222,11 +222,11 @@ struct SpectralTracking {
   [[gnu::always_inline]] static void take(Walk& walk, const auto& ray, const Value& coefficient, const Number& rate,
                                           const Number& own, const Number& sum) {
     const Number chance = own * rate;
+    const auto usual = chance > Number(least_normal(rate));  // of extinctions near the least number the product is none
     Value factor = coefficient * (sum / chance);
-    const auto tiny = chance < least_normal(rate);  // of extinctions near the least number the product is none
-    if (!none(tiny)) [[unlikely]]
-      factor = select(tiny, Value(coefficient / own * (sum / rate)), factor);
-    walk.weight = select(own > Number(0), Value(walk.weight * factor), Value(ray.value(0)));
+    if (!none(!usual)) [[unlikely]]
+      factor = select(usual, factor, select(own > Number(0), Value(coefficient / own * (sum / rate)), Value(ray.value(0))));
+    walk.weight *= factor;
   }
 
   /// Chances of a lookup and of a null collision at a point, and the null collision's factor of the weights.

@@ -92,7 +92,8 @@ TEST(EstimatorTraits, EveryOptionalMemberIsListed) {
   const std::string optional = interface.substr(interface.find("// Optional:"));
   std::size_t found = 0;
   for (const auto& [text, pattern] :
-       {std::pair(&traits, "\nNULLMARK_NAMES\\((\\w+)\\)"), std::pair(&optional, "\\b(k[A-Z]\\w+)[,\n ]")}) {
+       {std::pair(&traits, "\nNULLMARK_NAMES\\((\\w+)\\)"), std::pair(&optional, "\\b(k[A-Z]\\w+)[,\n ]"),
+        std::pair(&optional, "// +using (\\w+)\n")}) {
     const std::regex regex(pattern);
     for (std::sregex_iterator at(text->begin(), text->end(), regex), end; at != end; ++at, ++found)
       EXPECT_TRUE(listed.contains((*at)[1])) << (*at)[1];

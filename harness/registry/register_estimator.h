@@ -12,6 +12,7 @@ template <class E>
 std::vector<std::pair<const char*, bool>> optional_members() {
   using Traits = EstimatorTraits<E, Real>;
   constexpr bool data = requires { typename E::RayData; }, lanes = requires { requires E::kLanes; };
+  constexpr bool kept = requires { typename E::Kept; };
   constexpr bool samples = requires { E::kHeavySamples; }, lookups = requires { E::kHeavyLookups; };
   constexpr bool depth = requires { E::kNeedsOpticalDepth; };
   return {{"theory", Traits::kTheory},
@@ -33,6 +34,7 @@ std::vector<std::pair<const char*, bool>> optional_members() {
           {"component", Traits::kComponent},
           {"needs_optical_depth", Traits::kMayNeedOpticalDepth},
           {"kLanes", lanes},
+          {"Kept", kept},
           {"kGreyOnly", Traits::kGreyOnly},
           {"kIgnoresMajorant", Traits::kIgnoresMajorant},
           {"kHeavySamples", samples},

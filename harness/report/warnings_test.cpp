@@ -74,6 +74,9 @@ TEST(Summary, AViolationIsTellingByCountAndSize) {
   record.lookups = 3456;
   record.largest_violation = 1.25;
   EXPECT_EQ(reason_of(record), "needs a bound: 12 of 3456 lookups above the bound, the largest 1.25 times it");
+  record.majorant_violations = 0;
+  record.largest_violation.reset();
+  EXPECT_EQ(reason_of(record), "needs a bound: a point on a ray is above the bound");
 }
 
 }  // namespace

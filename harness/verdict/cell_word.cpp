@@ -23,6 +23,7 @@ bool takes_variance(const VerdictRecord& verdict) {
 std::string violations_of(const CellRecord& record) {
   const std::string largest =
       record.largest_violation ? fmt::format(", the largest {:.3g} times it", *record.largest_violation) : "";
+  if (record.majorant_violations == 0) return "a point on a ray is above the bound" + largest;
   return fmt::format("{} of {} lookups above the bound{}", record.majorant_violations, record.lookups, largest);
 }
 
