@@ -91,11 +91,11 @@ namespace nullmark {
 //       with kLanes: what one sample keeps beside registers, over OneSample<Value>; unbiased_ray_marching.h is an example.  Walk
 //       is std::conditional_t<kSideBySide<Value>, InLane, Kept>: Kept itself in the plain loop, a struct of registers in lanes;
 //       init, propose and consume have an overload for each, and both draw the same numbers in the same order.  The number of
-//       samples of a block in lanes, a multiple of 16, is Kept::kTogether.  Each begins with init(kept, ray, flight, rng), where
-//       rng is not the sample's stream: what is drawn from it must not be used.  After each consume, keep(walk, ray, at, alive,
-//       kept) stores what the walks have come to, for each lane k of the mask `alive` in kept(k); numbers(x) are the lanes of x,
-//       and as_bits(mask) has lane k as bit k.  A walk without a lookup is never kept.  At a walk's end lanes call finish(kept,
-//       ray) and result(kept, ray); the plain loop calls result alone
+//       samples of a block in lanes, a multiple of 16, is Kept::kTogether.  In lanes each begins with begin(kept, ray).  After
+//       each consume, keep(walk, ray, at, alive, kept) stores what the walks have come to, for each lane k of the mask `alive` in
+//       kept(k); numbers(x) are the lanes of x, and as_bits(mask) has lane k as bit k.  A walk without a lookup is never kept. At
+//       a walk's end lanes call finish(kept, ray) and result(kept, ray); the plain loop calls init, which may begin likewise, and
+//       result alone
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
 //       the harness fills exact_depth, knots, distance_at_depth, shares
 //

@@ -75,7 +75,10 @@ void add(const std::string& profile, bool ratio, Real lookups, const std::shared
   in_registry("least step, float", lane_floor<float, false>);
   in_registry("least step with exponential, double", lane_floor<double, true>);
   in_registry("least step with exponential, float", lane_floor<float, true>);
-  if (!ratio) in_registry("least step with exponential and two numbers, float", lane_floor<float, true, true>);
+  if (!ratio) {
+    in_registry("least step with exponential and two numbers, double", lane_floor<double, true, true>);
+    in_registry("least step with exponential and two numbers, float", lane_floor<float, true, true>);
+  }
 }
 
 [[maybe_unused]] const BenchmarkGroup kGroup([] {

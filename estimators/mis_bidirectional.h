@@ -41,7 +41,9 @@ struct BidirectionalMis {
   };
   using Walk = std::conditional_t<kSideBySide<Value>, AtVertex, Kept>;
 
-  void init(Kept& walk, const auto& ray, auto&, auto&) const { walk.start(ray.value(1)); }
+  void begin(Kept& walk, const auto& ray) const { walk.start(ray.value(1)); }
+
+  void init(Kept& walk, const auto& ray, auto&, auto&) const { begin(walk, ray); }
 
   bool propose(Kept& walk, const auto& ray, auto& flight, auto& rng) const {
     const Real total = ray.majorant.total_depth();

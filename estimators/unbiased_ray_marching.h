@@ -89,10 +89,14 @@ struct UnbiasedRayMarching {
   };
   using Walk = std::conditional_t<kSideBySide<Value>, March, Kept>;
 
-  void init(Kept& walk, const auto& ray, auto&, auto& rng) const {
+  void begin(Kept& walk, const auto& ray) const {
     walk.sum = walk.trend = ray.value(0);
     walk.before = ends();
     walk.order = walk.complete = 0;
+  }
+
+  void init(Kept& walk, const auto& ray, auto&, auto& rng) const {
+    begin(walk, ray);
     if (rng.uniform() < .1)
       for (walk.order = 2; walk.order < kMostOrder && rng.uniform() * (walk.order + 1) < 2;) ++walk.order;
   }

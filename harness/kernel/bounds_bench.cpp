@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <array>
+
 #include "estimators/delta.h"
 #include "estimators/spectral.h"
 #include "harness/kernel/estimator_template.h"
@@ -158,12 +160,15 @@ void composed(benchmark::State& state, const Source& tracker, std::shared_ptr<co
   const auto kernel = make_path_kernel(tracker, scene);
   const auto workspace = kernel->workspace();
   const Extrema extrema = scene.medium->extrema(scene.medium->bounds());
-  PreparedRay context;
+  // A ray is made one path before its own, as in a renderer: one that was stored a moment ago is waited for.
+  std::array<PreparedRay, 2> rays;
+  rays[0].world = camera(0);
   SampleBlock block;
   Counters counters;
   for ([[maybe_unused]] auto _ : state)
     for (std::size_t i = 0; i < 4096; ++i) {
-      context.world = camera(i);
+      rays[(i + 1) % 2].world = camera(i + 1);
+      PreparedRay& context = rays[i % 2];
       context.index = static_cast<std::uint32_t>(i);
       kernel->begin_ray(*workspace, *scene.medium, extrema, context);
       kernel->sample(*workspace, *scene.medium, context, 1, counters.samples / 4096, 1, Quantity::radiance, block, counters);

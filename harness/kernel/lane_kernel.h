@@ -275,9 +275,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
 
     /// Begins what the estimator keeps of each sample.
     [[gnu::noinline]] void begin_kept(std::size_t count) {
-      Flight flight;
-      Rng rng;
-      for (std::size_t i = 0; i < count; ++i) kernel.one().init(state.kept[i], state.ray, flight, rng);
+      for (std::size_t i = 0; i < count; ++i) kernel.one().begin(state.kept[i], state.ray);
     }
 
     static std::size_t sample_at(const std::array<T, kRow>& samples, std::size_t k) {
