@@ -42,15 +42,15 @@ std::vector<CellRecord> run(const Plan& plan, int threads, const RunObserver& ob
 
 /// Single precision is skipped where it has no digits for a position or a flight, and what it adds to a mean is no bias.
 TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
-  const auto only_record = [](const std::string& matrix) {
+  const auto only_record = [](const std::string& matrix, const std::string& tracker = R"("ratio")") {
     const Plan cells = read_config(R"({"nullmark":"config/2","timing":{"enabled":false},"experiments":[{"name":"e",
-        "rays":{"type":"single"},"samples_per_ray":20000,"matrix":{"estimator":"ratio","precision":"float",)" +
-                                       matrix + "}}]}",
+        "rays":{"type":"single"},"samples_per_ray":20000,"matrix":{"estimator":)" +
+                                       tracker + R"(,"precision":"float",)" + matrix + "}}]}",
                                    "test.json");
     return run(cells, 1, {}).at(0);
   };
-  const auto refused = [&](const std::string& matrix, const std::string& why) {
-    const CellRecord record = only_record(matrix);
+  const auto refused = [&](const std::string& matrix, const std::string& why, const std::string& tracker = R"("ratio")") {
+    const CellRecord record = only_record(matrix, tracker);
     EXPECT_EQ(record.status, Status::skipped) << matrix;
     EXPECT_NE(record.reason.find(why), std::string::npos) << record.reason;
     EXPECT_NE(record.reason.find("\"double\""), std::string::npos) << record.reason;
@@ -58,6 +58,8 @@ TEST(Run, FloatIsRefusedWhereItHasNoDigits) {
   refused(R"("medium":{"type":"checkerboard","lo":[2000,0,0],"hi":[2001,1,1]})", "from the origin of its frame");
   refused(R"("medium":"linear","majorant":{"type":"prescribed","value":16385})", "majorant depth 16385");
   refused(R"("medium":"linear","lanes":false)", "ratio has no walks one at a time in float; expected \"lanes\": true");
+  refused(R"("medium":"linear")", "spectral has no form in float with these parameters; expected its defaults",
+          R"({"type":"spectral","control":"minimum"})");
   EXPECT_EQ(only_record(R"("medium":{"type":"checkerboard","lo":[1000,0,0],"hi":[1001,1,1]})").status, Status::ok);
   // Every one of 10 000 factors of a weight rounds to the same side, by a share of the mean that sampling does show.
   const CellRecord loose =

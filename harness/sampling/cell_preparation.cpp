@@ -178,6 +178,9 @@ std::string CellPreparer::why_not(const Cell& cell, const Component& tracker, co
   const int channels = scene.medium->medium->channels();
   if (!made && !cell.lanes && make_estimator(tracker)->kernel(channels, cell.precision))
     return fmt::format("{} has no walks one at a time in float; expected \"lanes\": true or precision \"double\"", tracker.type);
+  if (!made && channels == 1 && make_estimator({tracker.type, {}, {}, {}})->kernel(1, cell.precision))
+    return fmt::format("{} has no form in float with these parameters; expected its defaults or precision \"double\"",
+                       tracker.type);
   if (!made)
     return channels > 1 ? fmt::format("{} channels have no form in float; expected precision \"double\"", channels)
                         : fmt::format("{} has no form in float; expected precision \"double\"", tracker.type);
