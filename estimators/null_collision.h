@@ -79,7 +79,7 @@ struct NullCollisionTracking {
     const Coefficients<Value> mu = ray.coefficients(extinction, at.position(), at.rate());
     const Chances chance = chances(ray, mu);
     const Number u = rng.uniform();
-    auto lost = u < Number(0);
+    auto lost = u < Number(0);  // no walk is lost yet
     walk.end = ray.three ? three_roulettes(chance, u, rng, lost) : choose_event(u, chance.absorb, chance.scatter, chance.null);
     const Number p = select(lost, Number(0), walk.end.of(chance.absorb, chance.scatter, chance.null));
     walk.weight = select(p > Number(0), Value(walk.weight * mu.of(walk.end) / (at.rate() * p)), Value(ray.value(0)));

@@ -114,7 +114,7 @@ struct SpectralTracking {
 
   auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
     const auto inside = flight.next(rng, !walk.end.ends());
-    // With a control flights and lookups part, and walks are not in lanes.
+    // Walks with a control look up less than they fly; they are never in lanes.
     if constexpr (!kSideBySide<Value>)
       if (inside && !ray.control.empty()) return looks_up(walk, ray, flight, rng);
     return inside;
@@ -222,7 +222,7 @@ struct SpectralTracking {
   [[gnu::always_inline]] static void take(Walk& walk, const auto& ray, const Value& coefficient, const Number& rate,
                                           const Number& own, const Number& sum) {
     const Number chance = own * rate;
-    const auto usual = chance > Number(least_normal(rate));  // of extinctions near the least number the product is none
+    const auto usual = chance > Number(least_normal(rate));  // it underflows for extinctions near the least number
     Value factor = coefficient * (sum / chance);
     if (!none(!usual)) [[unlikely]]
       factor = select(usual, factor, select(own > Number(0), Value(coefficient / own * (sum / rate)), Value(ray.value(0))));

@@ -5,18 +5,18 @@
 
 namespace nullmark {
 
-/// Which of three events a collision was: absorption, scattering, or a null collision.  Of walks in lanes a choice each.
+/// Which of three events a collision was: absorption, scattering, or a null collision.  In lanes it holds one choice per walk.
 template <class Truth>
 struct EventChoice {
   Truth absorbs = false, scatters = false;  ///< neither: a null collision
 
-  /// Absorption goes first.
+  /// Where both are true, absorption is chosen.
   static EventChoice from(const auto& absorbs, const auto& scatters) { return {absorbs, scatters & !absorbs}; }
 
   /// Whether the walk ends.
   auto ends() const { return !((!absorbs) & (!scatters)); }
 
-  /// Of each event's numbers those of the event that was chosen.
+  /// The number of the chosen event.
   template <class T>
   T of(const T& absorb, const T& scatter, const T& null) const {
     return select(absorbs, absorb, select(scatters, scatter, null));

@@ -160,7 +160,7 @@ void composed(benchmark::State& state, const Source& tracker, std::shared_ptr<co
   const auto kernel = make_path_kernel(tracker, scene);
   const auto workspace = kernel->workspace();
   const Extrema extrema = scene.medium->extrema(scene.medium->bounds());
-  // A ray is made one path before its own, as in a renderer: one that was stored a moment ago is waited for.
+  // Rays are stored one path ahead: a read waits for a store that was made a moment ago, and renderers have theirs ready.
   std::array<PreparedRay, 2> rays;
   rays[0].world = camera(0);
   SampleBlock block;

@@ -76,7 +76,7 @@ TEST(Summary, AViolationIsTellingByCountAndSize) {
   EXPECT_EQ(reason_of(record), "needs a bound: 12 of 3456 lookups above the bound, the largest 1.25 times it");
   record.majorant_violations = 0;
   record.largest_violation.reset();
-  EXPECT_EQ(reason_of(record), "needs a bound: a point on a ray is above the bound");
+  EXPECT_EQ(reason_of(record), "needs a bound: the extinction at a point on a ray is above the bound");
 }
 
 }  // namespace

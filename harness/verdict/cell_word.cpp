@@ -21,9 +21,9 @@ bool takes_variance(const VerdictRecord& verdict) {
 }
 
 std::string violations_of(const CellRecord& record) {
+  if (record.majorant_violations == 0) return "the extinction at a point on a ray is above the bound";
   const std::string largest =
       record.largest_violation ? fmt::format(", the largest {:.3g} times it", *record.largest_violation) : "";
-  if (record.majorant_violations == 0) return "a point on a ray is above the bound" + largest;
   return fmt::format("{} of {} lookups above the bound{}", record.majorant_violations, record.lookups, largest);
 }
 
