@@ -123,7 +123,7 @@ struct SpectralTracking {
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
     Coefficients<Value> mu = ray.coefficients(extinction, at.position(), at.rate());
     if constexpr (!kSideBySide<Value>)
-      if (!ray.control.empty()) mu = residual(ray, mu, at.piece());
+      if (!ray.control.empty()) [[unlikely]] mu = residual(ray, mu, at.piece());
     const Number absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : Number(0),
                  scatter = measure(ray, walk.weight, mu.scatter), null = measure(ray, walk.weight, mu.null);
     const auto event = choose_event(Number(rng.uniform()), absorb, scatter, null);
@@ -182,7 +182,7 @@ struct SpectralTracking {
   }
 
   /// Whether a tentative collision is to be looked up; otherwise it is the control's, and the walk is done.
-  static bool looks_up(Walk& walk, const RayData& ray, const Flight& flight, auto& rng) {
+  [[gnu::noinline]] static bool looks_up(Walk& walk, const RayData& ray, const Flight& flight, auto& rng) {
     const Control& split = ray.control[flight.piece()];
     walk.lookup_chance = lookup_chance(ray, walk.weight, flight.rate(), flight.piece());
     const Real u = rng.uniform();
@@ -212,7 +212,7 @@ struct SpectralTracking {
     return own > 0 ? rest / (own + rest) : 1;
   }
 
-  static Coefficients<Value> residual(const RayData& ray, Coefficients<Value> mu, std::size_t piece) {
+  [[gnu::noinline]] static Coefficients<Value> residual(const RayData& ray, Coefficients<Value> mu, std::size_t piece) {
     mu.absorb -= ray.control[piece].absorb;
     mu.scatter -= ray.control[piece].scatter;
     return mu;

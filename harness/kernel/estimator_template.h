@@ -86,12 +86,13 @@ class EstimatorTemplate final : public EstimatorSource {
     else
       return std::make_unique<BlockKernel<Estimator, Spectrum>>(chromatic_, channels);
   }
-  Walkers walkers(int channels) const override {
-    Walkers walkers{std::make_shared<EstimatorWalker<Estimator, Real>>(grey_), nullptr};
+  Walkers walkers() const override {
+    Walkers walkers;
+    walkers.grey = std::make_shared<EstimatorWalker<Estimator, Real>>(grey_);
     if constexpr (!kGreyOnly) walkers.chromatic = std::make_shared<EstimatorWalker<Estimator, Spectrum>>(chromatic_);
     if constexpr (kOfFixedWidth && Traits::kEvent) {
-      if (channels == 3) walkers.chromatic = std::make_shared<EstimatorWalker<Estimator, SpectrumOf<3>, Spectrum>>(three_);
-      if (channels == 4) walkers.chromatic = std::make_shared<EstimatorWalker<Estimator, SpectrumOf<4>, Spectrum>>(four_);
+      walkers.three = std::make_shared<EstimatorWalker<Estimator, SpectrumOf<3>>>(three_);
+      walkers.four = std::make_shared<EstimatorWalker<Estimator, SpectrumOf<4>>>(four_);
     }
     return walkers;
   }

@@ -165,7 +165,9 @@ class Walker;
 /// An estimator as light paths use it: see walker.h.  Null if they cannot.
 struct Walkers {
   std::shared_ptr<const Walker<Real>> grey;
-  std::shared_ptr<const Walker<Spectrum>> chromatic;
+  std::shared_ptr<const Walker<Spectrum>> chromatic;  ///< of any number of channels
+  std::shared_ptr<const Walker<SpectrumOf<3>>> three;
+  std::shared_ptr<const Walker<SpectrumOf<4>>> four;
 };
 
 /// What a tracker from outside of nullmark says of itself, for records.
@@ -191,7 +193,7 @@ class EstimatorSource {
   /// Null if there is none in this precision.  `lanes`: walks may run side by side in registers.
   virtual std::unique_ptr<const Kernel> kernel(int channels, Precision precision = Precision::float64,
                                                bool lanes = true) const = 0;
-  virtual Walkers walkers(int /*channels*/) const { return {}; }
+  virtual Walkers walkers() const { return {}; }
   /// The folder that paths among the parameters are relative to.
   virtual void locate(const std::string& /*folder*/) {}
   /// Of a tracker from outside of nullmark.

@@ -138,7 +138,7 @@ TEST(PathEmission, AGridOfHeatGlowsThroughAGridOfDensity) {
   scene.mean_cosine = 0.5;
   scene.environment.radiance = spectrum({1});
   scene.options.next_event = NextEvent::uniform;
-  scene.towards_environment = kRatio.walkers(scene.medium->channels());
+  scene.towards_environment = kRatio.walkers();
   expect_equal(radiance(kDelta, scene, ray, 20000), radiance(kSpectral, scene, ray, 20000, true, 2));
 }
 

@@ -43,7 +43,7 @@ TEST(PathFurnace, NextEventsAndRouletteKeepTheMean) {
           scene.mean_cosine = g;
           scene.options.next_event = next;
           scene.options.roulette_from = 0;
-          scene.towards_environment = kRatio.walkers(scene.medium->channels());
+          scene.towards_environment = kRatio.walkers();
           expect_mean(radiance(kDelta, scene, kOblique, 50000, general), spectrum({1}));
         }
 }
@@ -59,7 +59,7 @@ TEST(PathFurnace, ChromaticMediaKeepTheMeanOfEveryChannel) {
         scene.environment.radiance = spectrum({1, 2, 3});
         scene.mean_cosine = 0.5;
         scene.options.next_event = next;
-        scene.towards_environment = kRatio.walkers(scene.medium->channels());
+        scene.towards_environment = kRatio.walkers();
         const Estimate estimate = radiance(kSpectral, scene, kOblique, 50000, general);
         expect_mean(estimate, scene.environment.radiance);
         EXPECT_TRUE((estimate.expected == scene.environment.radiance).all());

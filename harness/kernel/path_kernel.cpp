@@ -9,11 +9,6 @@
 namespace nullmark {
 namespace {
 
-bool vanished(Real weight) { return weight == 0; }
-bool vanished(const Spectrum& weight) { return (weight == 0).all(); }
-Real largest_magnitude(Real weight) { return std::abs(weight); }
-Real largest_magnitude(const Spectrum& weight) { return weight.abs().maxCoeff(); }
-
 /// Paths, compiled for the effects that can be seen in their code; absorption, chromatic and heterogeneous are decided by who
 /// constructs it.
 template <class Value, Effects kEffects>
@@ -47,15 +42,17 @@ class PathKernel final : public RadianceKernel {
     state->camera.memory = walker_->memory();
     state->onward.memory = walker_->memory();
     state->shadow.memory = shadow_walker_->memory();
+    state->path_scene = {nullptr, &extrema_, scene_.majorant.get(), channels_, albedo_, scene_.albedo_field.get(),
+                         kEffects.emission};
     return state;
   }
 
   void begin_ray(Workspace& workspace, const Medium& medium, const Extrema&, const PreparedRay& context) const override {
     State& state = static_cast<State&>(workspace);
-    state.path_scene = {&medium,          &extrema_, scene_.majorant.get(), channels_, albedo_, scene_.albedo_field.get(),
-                        kEffects.emission};
-    state.camera_ray = camera_ray(context);
-    begin_leg(state, state.camera, *walker_, state.camera_ray);
+    state.path_scene.medium = &medium;
+    const Ray camera = camera_ray(context);
+    begin_leg(state, state.camera, *walker_, camera);
+    state.camera_ray = camera;
   }
 
   void sample(Workspace& workspace, const Medium&, const PreparedRay& context, std::uint64_t key, std::uint64_t first,
@@ -174,9 +171,9 @@ class PathKernel final : public RadianceKernel {
     } else if constexpr (std::is_same_v<Value, Real>) {
       return rng.uniform() < albedo;
     } else {
-      const Real whole = throughput.abs().sum();
+      const Real whole = sum_of(throughput.abs());
       if (whole == 0) return true;
-      const Real scattered = (throughput.abs() * albedo).sum(), absorbed = (throughput.abs() * (1 - albedo)).sum();
+      const Real scattered = sum_of(throughput.abs() * albedo), absorbed = sum_of(throughput.abs() * (1 - albedo));
       const Real both = scattered + absorbed;
       const bool chosen = rng.uniform() * both < scattered;
       throughput *= chosen ? Value(albedo * (both / scattered)) : Value((1 - albedo) * (both / absorbed));
@@ -206,7 +203,7 @@ class PathKernel final : public RadianceKernel {
 
   bool survives(int scatterings, Value& throughput, Rng& rng) const {
     if (!scene_.options.roulette_from || scatterings < *scene_.options.roulette_from) return true;
-    const Real probability = std::max(scene_.options.roulette_floor, std::min<Real>(1, largest_magnitude(throughput)));
+    const Real probability = std::max(scene_.options.roulette_floor, std::min<Real>(1, largest(magnitude(throughput))));
     if (probability == 1) return true;
     throughput /= probability;
     return rng.uniform() < probability;
@@ -247,16 +244,28 @@ std::unique_ptr<const Kernel> compiled_path_kernel(const TransportScene& scene, 
   });
 }
 
+/// Those of `Walkers` that walk by one type of Value.
 template <class Value>
-std::unique_ptr<const Kernel> make(const TransportScene& scene, const Effects& effects,
-                                   std::shared_ptr<const Walker<Value>> sampler, std::shared_ptr<const Walker<Value>> shadow) {
+using WalkersOf = std::shared_ptr<const Walker<Value>> Walkers::*;
+
+template <class Value>
+std::unique_ptr<const Kernel> make(const TransportScene& scene, const Effects& effects, const Walkers& walkers,
+                                   WalkersOf<Value> chosen) {
   const int channels = scene.medium->channels();
   if (!effects.heterogeneous) {
     const Spectrum extinction = scene.medium->extrema(scene.medium->bounds()).maximum;
     const auto walker = std::make_shared<HomogeneousWalker<Value>>(load<Value>(extinction.data(), channels));
     return compiled_path_kernel<Value>(scene, effects, walker, walker);
   }
+  const auto &sampler = walkers.*chosen, &shadow = scene.towards_environment.*chosen;
   return compiled_path_kernel<Value>(scene, effects, sampler, shadow ? shadow : sampler);
+}
+
+/// Whether all that walks in the chromatic scene has a form of this width.
+template <class Value>
+bool fits(const TransportScene& scene, const Effects& effects, const Walkers& walkers, WalkersOf<Value> chosen) {
+  const Walkers& shadow = scene.towards_environment;
+  return !effects.heterogeneous || (walkers.*chosen && (!shadow.chromatic || shadow.*chosen));
 }
 
 template <class Walk>
@@ -287,7 +296,7 @@ std::string why_no_paths(const EstimatorSource& estimator, const TransportScene&
   const Effects effects = asked_for(scene, general);
   if (!effects.heterogeneous) return "";
   if (!effects.scattering && !effects.emission) return why_not(*estimator.kernel(scene.medium->channels()), *scene.medium);
-  const Walkers walkers = estimator.walkers(scene.medium->channels()), &shadow = scene.towards_environment;
+  const Walkers walkers = estimator.walkers(), &shadow = scene.towards_environment;
   return effects.chromatic ? why_no_flights(walkers.chromatic, shadow.chromatic, scene)
                            : why_no_flights(walkers.grey, shadow.grey, scene);
 }
@@ -301,9 +310,12 @@ std::unique_ptr<const Kernel> make_path_kernel(const EstimatorSource& estimator,
     if (!effects.heterogeneous) return make_beer_lambert_kernel(scene);
     return make_absorption_kernel(scene, estimator.kernel(scene.medium->channels()));
   }
-  const Walkers walkers = estimator.walkers(scene.medium->channels());
-  if (effects.chromatic) return make<Spectrum>(scene, effects, walkers.chromatic, scene.towards_environment.chromatic);
-  return make<Real>(scene, effects, walkers.grey, scene.towards_environment.grey);
+  const Walkers walkers = estimator.walkers();
+  if (!effects.chromatic) return make(scene, effects, walkers, &Walkers::grey);
+  const int channels = scene.medium->channels();
+  if (channels == 3 && fits(scene, effects, walkers, &Walkers::three)) return make(scene, effects, walkers, &Walkers::three);
+  if (channels == 4 && fits(scene, effects, walkers, &Walkers::four)) return make(scene, effects, walkers, &Walkers::four);
+  return make(scene, effects, walkers, &Walkers::chromatic);
 }
 
 }  // namespace nullmark

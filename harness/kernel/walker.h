@@ -104,10 +104,9 @@ template <class E, class RayData>
 }
 
 /// Walks of an estimator.  If its RayData has a field `Value throughput`, this is set to the weight of the path so far, as
-/// history-aware collision probabilities require [Kutz et al. 2017, Sec. 5].  Inside it walks by `Value`; `Outside` may hold the
-/// same channels in another width.
-template <template <class> class Estimator, class Value, class Outside = Value>
-class EstimatorWalker final : public Walker<Outside> {
+/// history-aware collision probabilities require [Kutz et al. 2017, Sec. 5].
+template <template <class> class Estimator, class Value>
+class EstimatorWalker final : public Walker<Value> {
   using E = Estimator<Value>;
   using Traits = EstimatorTraits<E, Value>;
   using Along = typename Traits::RayData;
@@ -135,7 +134,7 @@ class EstimatorWalker final : public Walker<Outside> {
 
   bool needs_optical_depth() const override { return Traits::needs_optical_depth(estimator_); }
 
-  void begin(WalkMemory& memory, const PathScene<Outside>& path_scene, const Ray& world, const Ray& local) const override {
+  void begin(WalkMemory& memory, const PathScene<Value>& path_scene, const Ray& world, const Ray& local) const override {
     State& state = static_cast<State&>(memory);
     Along& ray = state.ray;
     state.local = local;
@@ -146,41 +145,33 @@ class EstimatorWalker final : public Walker<Outside> {
     ray.knots.clear();
     if (needs_knots()) sorted_knots(*path_scene.medium, local, ray.knots);
     prepare_ray<Traits>(ray, *path_scene.medium, *path_scene.extrema, world, state.local, path_scene.channels);
-    ray.set_albedo(inside(path_scene.albedo), path_scene.albedo_field, world);
+    ray.set_albedo(path_scene.albedo, path_scene.albedo_field, world);
     ray.draws_absorption = path_scene.draws_absorption;
     if constexpr (Traits::kPrepare) estimator_.prepare(ray);
   }
 
-  Event<Outside> fly(WalkMemory& memory, const PathScene<Outside>& path_scene, const Outside& throughput, Rng& rng,
+  Event<Value> fly(WalkMemory& memory, const PathScene<Value>& path_scene, const Value& throughput, Rng& rng,
                      EventBudget& budget, Counters& counters) const override {
     State& state = static_cast<State&>(memory);
-    if constexpr (requires { state.ray.throughput; }) state.ray.throughput = inside(throughput);
+    if constexpr (requires { state.ray.throughput; }) state.ray.throughput = throughput;
     [[maybe_unused]] const Flight at = walk(state, path_scene, rng, budget, counters);
-    if constexpr (Traits::kEvent) {
-      const Event<Value> event = estimator_.event(state.walk, state.ray, at);
-      return {event.kind, event.distance, Outside(event.weight)};
-    }
-    return {};
+    if constexpr (Traits::kEvent)
+      return estimator_.event(state.walk, state.ray, at);
+    else
+      return {};
   }
 
-  Outside transmittance(WalkMemory& memory, const PathScene<Outside>& path_scene, Rng& rng, EventBudget& budget,
+  Value transmittance(WalkMemory& memory, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget,
                         Counters& counters) const override {
     State& state = static_cast<State&>(memory);
     if constexpr (requires { state.ray.throughput; }) state.ray.throughput = uniform_value<Value>(path_scene.channels, 1);
     walk(state, path_scene, rng, budget, counters);
-    return Outside(estimator_.result(state.walk, state.ray));
+    return estimator_.result(state.walk, state.ray);
   }
 
  private:
-  static Value inside(const Outside& value) {
-    if constexpr (std::is_same_v<Value, Outside>)
-      return value;
-    else
-      return load<Value>(value.data(), static_cast<int>(value.size()));
-  }
-
   /// Walks to the end of the ray or of the budget.
-  [[gnu::flatten]] Flight walk(State& state, const PathScene<Outside>& path_scene, Rng& rng, EventBudget& budget,
+  [[gnu::flatten]] Flight walk(State& state, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget,
                                Counters& counters) const {
     const Vec3 origin = state.local.origin, direction = state.local.direction;
     const auto look_up = [&](const Walk& walk, const Flight& flight) {

@@ -81,13 +81,17 @@ int channel_count(const Colours<T>& x) {
   return static_cast<int>(x.size());
 }
 
-inline Real average(Real x) { return x; }
 /// From the first channel on, so that the sum is of the same bits at every width.
 template <class T>
-Real average(const Colours<T>& x) {
+Real sum_of(const Colours<T>& x) {
   Real sum = 0;
   for (Eigen::Index c = 0; c < x.size(); ++c) sum += x[c];
-  return sum / static_cast<Real>(x.size());
+  return sum;
+}
+inline Real average(Real x) { return x; }
+template <class T>
+Real average(const Colours<T>& x) {
+  return sum_of(x) / static_cast<Real>(x.size());
 }
 inline Real magnitude(Real x) { return std::abs(x); }
 template <class T>
