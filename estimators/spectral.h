@@ -121,15 +121,10 @@ struct SpectralTracking {
   }
 
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
-    Coefficients<Value> mu = ray.coefficients(extinction, at.position(), at.rate());
     if constexpr (!kSideBySide<Value>)
-      if (!ray.control.empty()) [[unlikely]] mu = residual(ray, mu, at.piece());
-    const Number absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : Number(0),
-                 scatter = measure(ray, walk.weight, mu.scatter), null = measure(ray, walk.weight, mu.null);
-    const auto event = choose_event(Number(rng.uniform()), absorb, scatter, null);
-    walk.end = event;
-    walk.looked_up = event.ends();
-    take(walk, ray, mu.of(event), at.rate() * walk.lookup_chance, event.of(absorb, scatter, null), absorb + scatter + null);
+      if (ray.albedo_field || !ray.control.empty()) [[unlikely]]
+        return consume_residual(walk, ray, at, extinction, rng);
+    take_event(walk, ray, at, ray.coefficients(extinction, at.position(), at.rate()), rng);
   }
 
   Value result(const Walk& walk, const auto& ray) const { return select(walk.end.ends(), Value(ray.value(0)), walk.weight); }
@@ -197,10 +192,28 @@ struct SpectralTracking {
     return false;
   }
 
-  /// R_k of the scheme.
+  /// What few rays need stays out of `consume`, whose numbers then stay in registers.
+  [[gnu::noinline]] static void consume_residual(Walk& walk, const RayData& ray, const Flight& at, const Value& extinction,
+                                                 auto& rng) {
+    Coefficients<Value> mu = ray.coefficients(extinction, at.position(), at.rate());
+    if (!ray.control.empty()) mu = residual(ray, mu, at.piece());
+    take_event(walk, ray, at, mu, rng);
+  }
+
+  [[gnu::always_inline]] static void take_event(Walk& walk, const auto& ray, const auto& at, const Coefficients<Value>& mu,
+                                                auto& rng) {
+    const Number absorb = ray.draws_absorption ? measure(ray, walk.weight, mu.absorb) : Number(0),
+                 scatter = measure(ray, walk.weight, mu.scatter), null = measure(ray, walk.weight, mu.null);
+    const auto event = choose_event(Number(rng.uniform()), absorb, scatter, null);
+    walk.end = event;
+    walk.looked_up = event.ends();
+    take(walk, ray, mu.of(event), at.rate() * walk.lookup_chance, event.of(absorb, scatter, null), absorb + scatter + null);
+  }
+
+  /// R_k of the scheme; where it is an average, times the number of channels: only ratios of R_k matter.
   [[gnu::always_inline]] static Number measure(const auto& ray, const Value& weight, const Value& coefficient) {
     const Value x = magnitude(ray.by_history ? Value(ray.throughput * weight * coefficient) : coefficient);
-    return ray.by_maximum ? largest(x) : average(x);
+    return ray.by_maximum ? largest(x) : channel_sum(x);
   }
 
   /// The rest is at least what the segment's bounds allow, also under a rate that does not exceed the control.
@@ -212,7 +225,7 @@ struct SpectralTracking {
     return own > 0 ? rest / (own + rest) : 1;
   }
 
-  [[gnu::noinline]] static Coefficients<Value> residual(const RayData& ray, Coefficients<Value> mu, std::size_t piece) {
+  static Coefficients<Value> residual(const RayData& ray, Coefficients<Value> mu, std::size_t piece) {
     mu.absorb -= ray.control[piece].absorb;
     mu.scatter -= ray.control[piece].scatter;
     return mu;

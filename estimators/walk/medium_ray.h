@@ -40,8 +40,8 @@ struct MediumRay {
 
   /// mu_a, mu_s and mub - mu at a distance, or at those of many walks.
   template <class Extinction>
-  Coefficients<Extinction> coefficients(const Extinction& extinction, const Distance<Extinction>& t,
-                                        const Distance<Extinction>& mub) const {
+  [[gnu::always_inline]] Coefficients<Extinction> coefficients(const Extinction& extinction, const Distance<Extinction>& t,
+                                                               const Distance<Extinction>& mub) const {
     if (albedo_field) return {extinction, values_at<Extinction>(t, [&](Real x) { return read_albedo(x); }), mub};
     return {extinction, Extinction(albedo), mub};
   }

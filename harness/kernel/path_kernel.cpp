@@ -42,7 +42,7 @@ class PathKernel final : public RadianceKernel {
     state->camera.memory = walker_->memory();
     state->onward.memory = walker_->memory();
     state->shadow.memory = shadow_walker_->memory();
-    state->path_scene = {nullptr, &extrema_, scene_.majorant.get(), channels_, albedo_, scene_.albedo_field.get(),
+    state->path_scene = {nullptr,          &extrema_, scene_.majorant.get(), channels_, albedo_, scene_.albedo_field.get(),
                          kEffects.emission};
     return state;
   }
@@ -60,7 +60,7 @@ class PathKernel final : public RadianceKernel {
     State& state = static_cast<State&>(workspace);
     const auto channels = static_cast<std::size_t>(channels_);
     out.values.resize(count * channels);
-    out.lookups.assign(count, 0);
+    out.lookups.resize(count);
     counters.samples += count;
     EventBudget budget(state.stop);
     for (std::size_t k = 0; k < count && !budget.stopped(); ++k) {
@@ -171,9 +171,9 @@ class PathKernel final : public RadianceKernel {
     } else if constexpr (std::is_same_v<Value, Real>) {
       return rng.uniform() < albedo;
     } else {
-      const Real whole = sum_of(throughput.abs());
+      const Real whole = channel_sum(throughput.abs());
       if (whole == 0) return true;
-      const Real scattered = sum_of(throughput.abs() * albedo), absorbed = sum_of(throughput.abs() * (1 - albedo));
+      const Real scattered = channel_sum(throughput.abs() * albedo), absorbed = channel_sum(throughput.abs() * (1 - albedo));
       const Real both = scattered + absorbed;
       const bool chosen = rng.uniform() * both < scattered;
       throughput *= chosen ? Value(albedo * (both / scattered)) : Value((1 - albedo) * (both / absorbed));

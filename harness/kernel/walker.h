@@ -96,7 +96,7 @@ template <class E, class RayData>
   flight.start(ray.majorant);
   estimator.init(walk, ray, flight, rng);
   for (std::uint32_t lookups = 1; goes_on() && estimator.propose(walk, ray, flight, rng); ++lookups) {
-    const auto extinction = look_up(walk, flight);
+    const auto& extinction = look_up(walk, flight);
     flight.set_lookups(lookups);
     estimator.consume(walk, ray, flight, extinction, rng);
   }
@@ -116,7 +116,7 @@ class EstimatorWalker final : public Walker<Value> {
     Along ray;
     Walk walk;
     nullmark::Ray local;
-    std::array<Real, kMostChannels<Value>> extinction;
+    Value extinction;
   };
 
  public:
@@ -138,6 +138,7 @@ class EstimatorWalker final : public Walker<Value> {
     State& state = static_cast<State&>(memory);
     Along& ray = state.ray;
     state.local = local;
+    if constexpr (std::is_same_v<Value, Spectrum>) state.extinction.resize(path_scene.channels);
     ray.bounds.start(*path_scene.majorant, world, local);
     ray.exact_depth.reset();
     if (needs_optical_depth())
@@ -150,8 +151,8 @@ class EstimatorWalker final : public Walker<Value> {
     if constexpr (Traits::kPrepare) estimator_.prepare(ray);
   }
 
-  Event<Value> fly(WalkMemory& memory, const PathScene<Value>& path_scene, const Value& throughput, Rng& rng,
-                     EventBudget& budget, Counters& counters) const override {
+  Event<Value> fly(WalkMemory& memory, const PathScene<Value>& path_scene, const Value& throughput, Rng& rng, EventBudget& budget,
+                   Counters& counters) const override {
     State& state = static_cast<State&>(memory);
     if constexpr (requires { state.ray.throughput; }) state.ray.throughput = throughput;
     [[maybe_unused]] const Flight at = walk(state, path_scene, rng, budget, counters);
@@ -162,7 +163,7 @@ class EstimatorWalker final : public Walker<Value> {
   }
 
   Value transmittance(WalkMemory& memory, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget,
-                        Counters& counters) const override {
+                      Counters& counters) const override {
     State& state = static_cast<State&>(memory);
     if constexpr (requires { state.ray.throughput; }) state.ray.throughput = uniform_value<Value>(path_scene.channels, 1);
     walk(state, path_scene, rng, budget, counters);
@@ -174,18 +175,18 @@ class EstimatorWalker final : public Walker<Value> {
   [[gnu::flatten]] Flight walk(State& state, const PathScene<Value>& path_scene, Rng& rng, EventBudget& budget,
                                Counters& counters) const {
     const Vec3 origin = state.local.origin, direction = state.local.direction;
-    const auto look_up = [&](const Walk& walk, const Flight& flight) {
+    const auto look_up = [&](const Walk& walk, const Flight& flight) -> const Value& {
       const Real t = flight.position();
       // Three numbers instead of a point: a point is read in pairs of numbers, and such a read waits for both stores.
       const Real x = origin.x() + t * direction.x(), y = origin.y() + t * direction.y(), z = origin.z() + t * direction.z();
       if constexpr (Traits::kNeedsShares) {
         const int component = estimator_.component(walk);
-        state.extinction[0] =
+        channel(state.extinction, 0) =
             path_scene.medium->component_extinction(component, {x, y, z}) / state.ray.shares[flight.piece()][component];
       } else {
-        path_scene.medium->extinction({&x, &y, &z, 1}, state.extinction.data());
+        path_scene.medium->extinction({&x, &y, &z, 1}, numbers_of(state.extinction));
       }
-      const Value extinction = load<Value>(state.extinction.data(), path_scene.channels);
+      const Value& extinction = state.extinction;
       if constexpr (!Traits::kIgnoresMajorant)
         audit_majorant(largest(extinction), state.ray.majorant.rate_on_the_way(flight.piece()), counters);
       budget.spend();

@@ -126,11 +126,12 @@ class LaneColours {
     for (std::size_t c = 1; c < C; ++c) most = larger(most, a[c]);
     return most;
   }
-  friend Pack average(const LaneColours& a) {
-    Pack sum(0);
-    for (std::size_t c = 0; c < C; ++c) sum += a[c];
-    return sum / Pack(C);
+  friend Pack channel_sum(const LaneColours& a) {
+    Pack sum = a[0];
+    for (std::size_t c = 1; c < C; ++c) sum += a[c];
+    return sum;
   }
+  friend Pack average(const LaneColours& a) { return channel_sum(a) / Pack(C); }
   friend Pack smallest(const LaneColours& a) {
     Pack least = a[0];
     for (std::size_t c = 1; c < C; ++c) least = smaller(least, a[c]);

@@ -64,6 +64,7 @@ class Lanes {
   friend Lanes smallest(Lanes a) { return a; }
   friend Lanes largest(Lanes a) { return a; }
   friend Lanes average(Lanes a) { return a; }
+  friend Lanes channel_sum(Lanes a) { return a; }
   friend Lanes magnitude(Lanes a) { return hn::Abs(a.vector_); }
   friend Lanes signed_root(Lanes a) { return hn::CopySign(hn::Sqrt(hn::Abs(a.vector_)), a.vector_); }
   friend Lanes rounded_down(Lanes a) { return hn::Floor(a.vector_); }

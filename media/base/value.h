@@ -43,6 +43,13 @@ Value load(const Real* data, int channels) {
     return *data;
 }
 
+/// Where a Value's numbers lie.
+inline Real* numbers_of(Real& value) { return &value; }
+template <int width>
+Real* numbers_of(SpectrumOf<width>& value) {
+  return value.data();
+}
+
 inline void store(Real value, Real* data) { *data = value; }
 template <int width>
 void store(const SpectrumOf<width>& value, Real* data) {
@@ -81,17 +88,18 @@ int channel_count(const Colours<T>& x) {
   return static_cast<int>(x.size());
 }
 
+inline Real channel_sum(Real x) { return x; }
 /// From the first channel on, so that the sum is of the same bits at every width.
 template <class T>
-Real sum_of(const Colours<T>& x) {
-  Real sum = 0;
-  for (Eigen::Index c = 0; c < x.size(); ++c) sum += x[c];
+Real channel_sum(const Colours<T>& x) {
+  Real sum = x[0];
+  for (Eigen::Index c = 1; c < x.size(); ++c) sum += x[c];
   return sum;
 }
 inline Real average(Real x) { return x; }
 template <class T>
 Real average(const Colours<T>& x) {
-  return sum_of(x) / static_cast<Real>(x.size());
+  return channel_sum(x) / static_cast<Real>(x.size());
 }
 inline Real magnitude(Real x) { return std::abs(x); }
 template <class T>

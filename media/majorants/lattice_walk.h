@@ -56,7 +56,8 @@ class LatticeWalk {
       stride_[axis] = up ? stride : -stride;
       plane_[axis] = up ? at + 1 : at;
       next_[axis] = crossing(lattice, local, axis);
-      plane_[axis] += up ? 1 : -1;
+      way_[axis] = up ? 1 : -1;
+      plane_[axis] += way_[axis];
       after_[axis] = crossing(lattice, local, axis);
       stride *= last + 1;
     }
@@ -77,8 +78,8 @@ class LatticeWalk {
         --left_[axis];
         cell_ += stride_[axis];
         next_[axis] = after_[axis];
-        plane_[axis] += stride_[axis] > 0 ? 1 : -1;
-        after_[axis] = crossing(lattice, local, axis);
+        plane_[axis] += way_[axis];
+        after_[axis] = plane_at(lattice, local, axis);
       }
       if (!(to > from_)) continue;
       from_ = to;
@@ -90,10 +91,11 @@ class LatticeWalk {
  private:
   /// Where the ray meets plane_ of an axis.  From the plane's index, not accumulated, so that it does not drift over many cells.
   Real crossing(const Lattice& lattice, const Ray& local, std::size_t axis) const {
+    return local.direction[static_cast<Eigen::Index>(axis)] == 0 ? kInfinity : plane_at(lattice, local, axis);
+  }
+  Real plane_at(const Lattice& lattice, const Ray& local, std::size_t axis) const {
     const auto k = static_cast<Eigen::Index>(axis);
-    const Real direction = local.direction[k];
-    if (direction == 0) return kInfinity;
-    return (lattice.lo[k] + plane_[axis] * lattice.size[k] - local.origin[k]) / direction;
+    return (lattice.lo[k] + plane_[axis] * lattice.size[k] - local.origin[k]) / local.direction[k];
   }
 
   Real from_ = 0, end_ = 0;
@@ -101,7 +103,7 @@ class LatticeWalk {
   std::array<std::ptrdiff_t, 3> left_{}, stride_{};  ///< cells ahead of the current one along each axis; between their indices
   /// Where the ray leaves its cell along each axis, and the one after it: the next step need not wait for a division.
   std::array<Real, 3> next_{}, after_{};
-  std::array<Real, 3> plane_{};  ///< index of the plane of `after_`
+  std::array<Real, 3> plane_{}, way_{};  ///< index of the plane of `after_`; from it to that of the next, 1 or -1
 };
 
 }  // namespace nullmark

@@ -28,7 +28,7 @@ class RatePieces {
   void start(Real begin) {
     pieces_.resize(1);
     pieces_.front() = {begin, begin, 0, kInfinity, 0, 0};
-    empty_ = true;
+    size_ = 0;
     total_depth_ = 0;
   }
 
@@ -36,14 +36,13 @@ class RatePieces {
   void append(Real end, Real rate) {
     const Real from = pieces_.back().end, before = total_depth_;
     if (rate > 0) total_depth_ += rate * (end - from);
-    if (empty_) pieces_.clear();
-    empty_ = false;
+    if (size_++ == 0) pieces_.clear();
     // Finite for denormal rates as well: 0 times it is then a number.
     const Real inverse = rate > 0 ? std::min(1 / rate, std::numeric_limits<Real>::max()) : kInfinity;
     pieces_.push_back({from, end, rate, inverse, before, total_depth_});
   }
 
-  std::size_t size() const { return empty_ ? 0 : pieces_.size(); }
+  std::size_t size() const { return size_; }
   Real total_depth() const { return total_depth_; }
   const RatePiece<Real>& operator[](std::size_t i) const { return pieces_[i]; }
   /// At least one.
@@ -52,7 +51,7 @@ class RatePieces {
  private:
   std::vector<RatePiece<Real>> pieces_{{0, 0, 0, kInfinity, 0, 0}};
   Real total_depth_ = 0;
-  bool empty_ = true;
+  std::size_t size_ = 0;  ///< without the piece of a ray that misses
 };
 
 /// A majorant structure walked along a ray, cell by cell, as far as a flight asks.
