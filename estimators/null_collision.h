@@ -41,7 +41,13 @@ struct NullCollisionTracking {
   }
 
   void check(const MatterBounds&) const {
-    if (probabilities != "fixed") return;
+    if (probabilities != "fixed") {
+      const NullCollisionTracking usual;
+      if (absorb != usual.absorb || scatter != usual.scatter || null != usual.null)
+        throw ParameterError("probabilities",
+                             "found chances of events, which \"proportional\" does not use; expected \"fixed\", or no chances");
+      return;
+    }
     constexpr Real kRounding = 1e-12;
     if (roulette == "one" && std::abs(absorb + scatter + null - 1) > kRounding)
       throw ParameterError("null", "absorb, scatter and null sum to " + std::to_string(absorb + scatter + null) +

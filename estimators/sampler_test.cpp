@@ -244,5 +244,14 @@ TEST(Sampler, NullCollisionRefusesProbabilitiesThatDoNotSumToOne) {
   EXPECT_THROW(fixed(1, .3, .4, "three").check(grey), ParameterError);
 }
 
+TEST(Sampler, NullCollisionRefusesChancesThatItDoesNotUse) {
+  const auto proportional = [](Real absorb) {
+    return with<NullCollisionTracking>([&](auto& e) { e.absorb = absorb; });
+  };
+  const Extrema grey = Extrema::grey(0.5, 1, 2);
+  EXPECT_NO_THROW(proportional(.25).check(grey));
+  EXPECT_THROW(proportional(.2).check(grey), ParameterError);
+}
+
 }  // namespace
 }  // namespace nullmark

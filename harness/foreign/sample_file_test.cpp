@@ -267,9 +267,7 @@ TEST_F(SampleFiles, ProblemsThatFailLeaveNothing) {
   EXPECT_EQ(run("problem c.json -o q --resolution 8"), 2);
   EXPECT_EQ(read("err"),
             "nullmark: c.json: /experiments/0/matrix/medium/1/file: nowhere.vdb: no such file in the current folder (grid "
-            "\"density\"); say "
-            "\"optional\": true "
-            "to leave it out\n");
+            "\"density\"); `nullmark make-volume nowhere.vdb` writes a procedural one; say \"optional\": true to leave it out\n");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "q"));
   write("c.json", volume(R"(,"optional":true)"));
   EXPECT_EQ(run("problem c.json -o q --resolution 8"), 0);

@@ -203,8 +203,10 @@ class CellRun {
     if (record_.status == Status::ok && verdict && verdict->nonfinite > 0) {
       record_.status = Status::error;
       record_.nonfinite += verdict->nonfinite;
-      record_.reason = fmt::format("{} samples are not finite, among those drawn for the verdict; `replay` shows the first",
-                                   verdict->nonfinite);
+      record_.reason = fmt::format(
+          "{} of the samples that the verdict drew beyond the planned ones are not finite; after a run of samples_per_ray {} "
+          "`replay` shows the first",
+          verdict->nonfinite, verdict->samples_per_ray);
     }
     if (record_.status == Status::ok && outcome_.effort.overruns > 0) {
       record_.status = Status::error;

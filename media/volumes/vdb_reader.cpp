@@ -200,8 +200,8 @@ VolumeData read_vdb(const std::string& file, const std::string& grid) {
   std::error_code error;
   const std::filesystem::file_status found = std::filesystem::status(file, error);
   if (!std::filesystem::exists(found))
-    throw MissingData(fmt::format("{}: no such file{} (grid \"{}\")", file,
-                                  std::filesystem::path(file).is_relative() ? " in the current folder" : "", grid));
+    throw MissingData(fmt::format("{}: no such file{} (grid \"{}\"); `nullmark make-volume {}` writes a procedural one", file,
+                                  std::filesystem::path(file).is_relative() ? " in the current folder" : "", grid, file));
   // A pipe or a device would keep its reader waiting.
   if (!std::filesystem::is_regular_file(found)) refuse("not a regular file; expected the path of an OpenVDB file");
   if (::access(file.c_str(), R_OK) != 0)
