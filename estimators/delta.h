@@ -17,7 +17,9 @@ struct DeltaTracking {
   static constexpr bool kNeedsBound = true;
   static constexpr bool kLanes = true;
 
-  static constexpr bool kChromatic = kIsChromatic<Value>;
+  static constexpr bool kChromatic = kIsChromatic<OneSample<Value>>;
+  /// Whether each channel can walk for itself.
+  static constexpr bool kSeparable = kIsChromatic<Value>;
 
   std::string walks = "shared";
 
@@ -50,29 +52,25 @@ struct DeltaTracking {
   }
 
   struct Grey {
-    Value transmittance;
+    Truth<Value> done = false;
   };
-  struct Chromatic {
+  struct Shared {
     Value transmittance;
+    Truth<Value> done = false;
+  };
+  struct Separable : Shared {
     int walking = 0;  ///< the channel that walks, where each walks for itself
-    bool done = false;
   };
-  using Walk = std::conditional_t<kChromatic, Chromatic, Grey>;
-
-  static auto done(const Walk& walk) {
-    if constexpr (kChromatic)
-      return walk.done;
-    else
-      return vanished(walk.transmittance);
-  }
+  using Walk = std::conditional_t<kSeparable, Separable, std::conditional_t<kChromatic, Shared, Grey>>;
 
   void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
-    walk = {ray.value(1)};
+    walk = {};
+    if constexpr (kChromatic) walk.transmittance = ray.value(1);
     if (!ray.per_channel.empty()) flight.start(ray.per_channel[0]);
   }
 
   auto propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
-    if constexpr (kChromatic) {
+    if constexpr (kSeparable) {
       while (!ray.per_channel.empty()) {
         if (flight.next(rng, !walk.done)) return true;
         walk.done = false;
@@ -80,38 +78,47 @@ struct DeltaTracking {
         flight.start(ray.per_channel[static_cast<std::size_t>(walk.walking)]);
       }
     }
-    return flight.next(rng, !done(walk));
+    return flight.next(rng, !walk.done);
   }
 
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto& rng) const {
     const Distance<Value> threshold = rng.uniform() * at.rate();
-    if constexpr (kChromatic) {
+    if constexpr (kSeparable) {
       if (!ray.per_channel.empty()) {
         walk.done = threshold < extinction[walk.walking];
         if (walk.done) walk.transmittance[walk.walking] = 0;
         return;
       }
     }
-    walk.transmittance = select(extinction > threshold, ray.value(0), walk.transmittance);
-    if constexpr (kChromatic) walk.done = vanished(walk.transmittance);
+    if constexpr (kChromatic) {
+      walk.transmittance = select(extinction > threshold, ray.value(0), walk.transmittance);
+      walk.done = vanished(walk.transmittance);
+    } else {
+      walk.done = extinction > threshold;
+    }
   }
 
-  Value result(const Walk& walk, const auto&) const { return walk.transmittance; }
+  Value result(const Walk& walk, const auto& ray) const {
+    if constexpr (kChromatic)
+      return walk.transmittance;
+    else
+      return select(walk.done, Value(ray.value(0)), Value(ray.value(1)));
+  }
 
-  Value transmittance_at(const Walk& walk, const RayData&, Real) const { return walk.transmittance; }
+  Value transmittance_at(const Walk& walk, const RayData& ray, Real) const { return result(walk, ray); }
 
   /// Channels that share a walk end apart.
   bool samples_events(int channels) const { return channels == 1; }
 
   Event<Value> event(const Walk& walk, const RayData& ray, const Flight& at) const {
-    return {done(walk) ? EventKind::collision : EventKind::escape, at.position(), ray.value(1)};
+    return {walk.done ? EventKind::collision : EventKind::escape, at.position(), ray.value(1)};
   }
 
   auto real_collisions(const Walk& walk, const auto& ray) const {
-    if constexpr (kChromatic)
+    if constexpr (kSeparable)
       return static_cast<int>(ray.per_channel.empty() ? walk.done : (walk.transmittance == 0).count());
     else
-      return done(walk);
+      return walk.done;
   }
 
   /// Where the majorant is violated every collision is accepted: the walk sees min(mu, mub).

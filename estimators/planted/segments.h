@@ -52,7 +52,7 @@ struct PlantedEarlySurface : DeltaTracking<Value> {
   using Walk = typename DeltaTracking<Value>::Walk;
 
   bool propose(Walk& walk, const RayData& ray, Flight& flight, auto& rng) const {
-    while (!this->done(walk) && flight.piece() < ray.majorant.size()) {
+    while (!walk.done && flight.piece() < ray.majorant.size()) {
       const std::size_t cell = flight.piece();
       const Real exponential = rng.exponential();
       if (flight.position() + exponential / ray.majorant.rate(cell) >= ray.end) return flight.advance_to(kInfinity);

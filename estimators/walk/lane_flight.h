@@ -80,8 +80,9 @@ class LaneFlight {
   /// See Flight::lookups.
   std::uint32_t lookups() const { return lookups_; }
 
-  void start(const nullmark::Rates& rates) requires several {
-    rates_ = Rates(rates);
+  void start(const nullmark::Rates& rates) requires several { start(Rates(rates)); }
+  void start(const Rates& rates) requires several {
+    rates_ = rates;
     at_ = {Pack(0), Pack(rates_.begin_), Index(0)};
   }
 

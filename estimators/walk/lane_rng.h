@@ -26,7 +26,8 @@ class LaneRng {
   static State seeded(const SampleAddress& first);
 
   /// Goes on from the state and leaves it where it has come to; draws count for the lanes that are alive.
-  LaneRng(State& state, Mask alive) : state_(state), alive_(alive), living_(count(alive)) {}
+  LaneRng(State& state, Mask alive) : LaneRng(state, alive, count(alive)) {}
+  LaneRng(State& state, Mask alive, std::size_t living) : state_(state), alive_(alive), living_(living) {}
 
   /// Multiples of 2^-53 (2^-24 in float) in [0, 1).
   [[gnu::always_inline]] Pack uniform() {
@@ -160,28 +161,29 @@ class LaneRng {
 template <class T, std::size_t N>
 typename LaneRng<T, N>::State LaneRng<T, N>::seeded(const SampleAddress& first) {
   using namespace hn;
-  // Philox4x32-10 (media/base/philox.h), each of its words in the low half of a 64-bit lane.
+  // Philox4x32-10 (media/base/philox.h), each of its words in the low half of a 64-bit lane; the high halves mean nothing.
   constexpr std::size_t kWide = N < kNativeLanes<double> ? N : kNativeLanes<double>;
   const FixedTag<std::uint64_t, kWide> wide;
   const auto block = [&](std::uint64_t from) {
-    const auto sample = Add(Iota(wide, 0), Set(wide, from)), low = Set(wide, 0xffffffff);
-    auto c0 = And(sample, low), c1 = ShiftRight<32>(sample), c2 = Set(wide, first.ray), c3 = Zero(wide);
+    const auto sample = Add(Iota(wide, 0), Set(wide, from));
+    auto c0 = sample, c1 = ShiftRight<32>(sample), c2 = Set(wide, first.ray), c3 = Zero(wide);
     std::uint32_t k0 = static_cast<std::uint32_t>(first.key), k1 = static_cast<std::uint32_t>(first.key >> 32);
     const RepartitionToNarrow<decltype(wide)> narrow;
     for (int round = 0; round < 10; ++round, k0 += 0x9E3779B9, k1 += 0xBB67AE85) {
       const auto a = MulEven(BitCast(narrow, c0), Set(narrow, 0xD2511F53)),
                  b = MulEven(BitCast(narrow, c2), Set(narrow, 0xCD9E8D57));
       c0 = Xor(Xor(ShiftRight<32>(b), c1), Set(wide, k0));
-      c1 = And(b, low);
+      c1 = b;
       c2 = Xor(Xor(ShiftRight<32>(a), c3), Set(wide, k1));
-      c3 = And(a, low);
+      c3 = a;
     }
     return std::array{c0, c1, c2, c3};
   };
   State state;
   const auto words = block(first.sample);
   if constexpr (kDouble) {
-    for (std::size_t w = 0; w < kWords; ++w) state[w] = Or(words[2 * w], ShiftLeft<32>(words[2 * w + 1]));
+    const auto low = Set(wide, 0xffffffff);
+    for (std::size_t w = 0; w < kWords; ++w) state[w] = Or(And(words[2 * w], low), ShiftLeft<32>(words[2 * w + 1]));
   } else if constexpr (N == kWide) {
     for (std::size_t w = 0; w < kWords; ++w) state[w] = TruncateTo(Tag(), words[w]);
   } else {

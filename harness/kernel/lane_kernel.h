@@ -14,11 +14,11 @@
 namespace nullmark {
 
 /// The loop of BlockKernel with N walks per register, over C channels: the same estimator source over Lanes or LaneColours, the
-/// same steps, and in double the same samples bit for bit.  All walks of a block take a step together.  The numbers of an ended
-/// walk stay what they were at its end until ended walks leave the block and the others are compacted.  An estimator takes part
-/// by `static constexpr bool kLanes = true`, with a Walk of Value, Distance<Value>, Truth<Value> and structs of them, and with
-/// functions that take ray, flight and stream as auto.  Lanes answer transmittance and optical depth.  In double the base answers
-/// the other quantities; float has no others.
+/// same steps, and in double the same samples bit for bit.  All walks of a block take a step together.  Walks that end with it
+/// leave the block after it, and the block's last walks take their places.  An estimator takes part by `static constexpr bool
+/// kLanes = true`, with a Walk of Value, Distance<Value>, Truth<Value> and structs of them, and with functions that take ray,
+/// flight and stream as auto.  Lanes answer transmittance and optical depth.  In double the base answers the other quantities;
+/// float has no others.
 template <template <class> class Estimator, class T, std::size_t N = kNativeLanes<T>, std::size_t C = 1>
 class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
   using Base = BlockKernel<Estimator, OfChannels<C>>;
@@ -42,7 +42,6 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
 
   static_assert(kBlock % N == 0, "a tracker's Kept::kTogether is a multiple of 16, so that a block has whole registers");
 
-  /// N walks.  All registers have the same lane order, so one permutation compacts them.
   struct Walks {
     LanePlace<T, N> place;
     typename E::Walk walk;
@@ -78,12 +77,10 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, kNumbers> numbers{};
     alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, 3> points{};  ///< [axis][walk]
     alignas(HWY_MAX_BYTES) std::array<T, kRow * C> extinction{};
-    alignas(HWY_MAX_BYTES) std::array<T, kRow> steps{};  ///< of walks that have ended, as the bits of an Index
-    std::array<std::uint8_t, kBlock / N * Mask::kBytes> ended{};
-    /// Numbers of ended walks after compaction, and their results; whole registers are written at the end.
+    std::array<std::uint32_t, kRow> ended{};  ///< lanes of the walks that end with this step
+    /// Of the walks that have left: their numbers and samples; whole registers are read at the end.
     alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, sizeof(typename E::Walk) / sizeof(Pack)> left_walk{};
-    alignas(HWY_MAX_BYTES) std::array<T, kRow> left_sample{}, left_steps{};
-    alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, C> left_result{};
+    alignas(HWY_MAX_BYTES) std::array<T, kRow> left_sample{};
     std::array<OneWalk, kKeeps ? kBlock : 0> kept;  ///< of each sample of the block
   };
 
@@ -127,8 +124,9 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
   /// Counts of a block.
   struct Tally {
     std::uint64_t draws = 0, lookups = 0, real = 0, violations = 0;
-    std::size_t walks = 0;  ///< in the first lanes, including walks that ended since the last compaction
-    std::size_t dead = 0;   ///< lanes of ended walks
+    std::size_t walks = 0;  ///< in the first lanes
+    std::size_t ended = 0;  ///< of them, with this step
+    std::size_t left = 0;   ///< those before
   };
 
   /// One block of samples in progress.  Code that runs once per block is not inlined, and all of a step is, so the code of a step
@@ -145,6 +143,8 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     Counters& counters;
     Rates rates = {}, majorant = Rates(state.ray.majorant);
     std::array<T, 3> origin = narrowed(context.local.origin), direction = narrowed(context.local.direction);
+    /// Along which axes; coordinates along the others keep their value from the begin of the block.
+    std::array<bool, 3> moves = {direction[0] != 0, direction[1] != 0, direction[2] != 0};
     /// The spectrum that multiplies a grey field, where the medium is such a product; the field is then looked up.
     std::conditional_t<(C > 1), std::optional<Value>, std::monostate> factors = {};
 
@@ -152,36 +152,32 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       return {static_cast<T>(v.x()), static_cast<T>(v.y()), static_cast<T>(v.z())};
     }
 
-    /// Coordinates along which the ray does not move keep the value from the begin of the block.
-    bool moves_along(std::size_t axis) const { return direction[axis] != 0; }
-
     [[gnu::flatten]] void block(std::size_t count) {
       Tally tally{.walks = count};
       if constexpr (kKeeps) begin_kept(count);
-      std::size_t lanes = (count + N - 1) / N * N;
       const Medium* field = &medium;
       // One number a lookup, multiplied in registers, takes less time than a spectrum in memory.
       if constexpr (C > 1)
         if (const auto parts = medium.scaled()) field = parts->grey, factors = Value(parts->factors);
       for (std::size_t axis = 0; axis < 3; ++axis)
-        if (!moves_along(axis)) std::fill_n(state.points[axis].begin(), lanes, origin[axis]);
-      for (std::size_t k = 0; k < lanes; k += N) set_out(k, tally);
-      lanes = close_ranks(lanes, tally);
-      for (std::uint32_t step = 1; lanes > 0; ++step) {
+        if (!moves[axis]) std::fill_n(state.points[axis].begin(), (count + N - 1) / N * N, origin[axis]);
+      for (std::size_t k = 0; k < count; k += N) set_out(k, tally);
+      take_out_ended(0, tally);
+      for (std::uint32_t step = 1; tally.walks > 0; ++step) {
         if (step % Base::kStepsBetweenStops == 0 && state.stop()) return;
         if (step == state.most_lookups) {
-          counters.overruns += lanes - tally.dead;
+          counters.overruns += tally.walks;
           break;
         }
         const auto& [x, y, z] = state.points;
         field->extinction(BasicPoints<T>{x.data(), y.data(), z.data(), looked_up(tally.walks)}, state.extinction.data());
         if (rates.has_several())
-          go_on<true>(lanes, step, tally);
+          go_on<true>(step, tally);
         else
-          go_on<false>(lanes, step, tally);
-        // Moving walks costs more than idle lanes do, until a quarter of them idles.
-        if (4 * tally.dead >= lanes) lanes = close_ranks(lanes, tally);
+          go_on<false>(step, tally);
+        take_out_ended(step, tally);
       }
+      write_results(tally.left);
       counters.draws += tally.draws;
       counters.lookups += tally.lookups;
       counters.violations += tally.violations;
@@ -210,67 +206,65 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       walks.sample = Index::counting_from(static_cast<typename Index::Number>(k));
       LaneFlight<T, N> flight(rates, walks.place, 0);
       Streams rng(walks.stream, there);
-      flight.start(state.ray.majorant);
+      flight.start(majorant);
       kernel.estimator_.init(walks.walk, state.ray, flight, rng);
       bits(walks.sample).store(&state.numbers[kSample][k]);
-      propose(k, walks, there, false, flight, rng, 0, tally);
-      tally.dead += N - count(there);
+      propose(k, walks, there, flight, rng, tally);
     }
 
     /// One step of all walks.  What the loop reads is copied first: the compiler must assume that a register's store changes
     /// anything else.
     template <bool several>
-    [[gnu::always_inline]] void go_on(std::size_t lanes, std::uint32_t step, Tally& tally) {
+    [[gnu::always_inline]] void go_on(std::uint32_t step, Tally& tally) {
       Run here = *this;
-      for (std::size_t k = 0; k < lanes; k += N) here.template step_on<several>(k, step, tally);
+      for (std::size_t k = 0; k < tally.walks; k += N) here.template step_on<several>(k, step, tally);
     }
 
     template <bool several>
     [[gnu::always_inline]] void step_on(std::size_t k, std::uint32_t step, Tally& tally) {
-      const Mask ended = Mask::load(&state.ended[k / N * Mask::kBytes]), alive = there(k, tally) & !ended;
+      const Mask alive = there(k, tally);
       Walks walks;
       walks.place.piece = Index(0);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
         if (n != kPiece || several) load(lanes, state.numbers[n], k);
       });
       LaneFlight<T, N, several> flight(rates, walks.place, step);
-      Streams rng(walks.stream, alive);
+      Streams rng(walks.stream, alive, std::min(N, tally.walks - k));
       const Value extinction = extinction_at(k);
       if constexpr (!Traits::kIgnoresMajorant)
         audit_majorant(largest(extinction), majorant.template rate<several>(flight.piece()), alive, tally.violations,
                        counters.largest_violation);
       kernel.estimator_.consume(walks.walk, state.ray, flight, extinction, rng);
+      // Weights that went on shrinking in idle lanes would become denormal, and such numbers take hundreds of cycles.
+      if (k + N > tally.walks)
+        walks.each_of_walk([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
+          if constexpr (std::is_same_v<std::remove_cvref_t<decltype(lanes)>, Pack>)
+            lanes = select(alive, lanes, Pack::load(&state.numbers[n][k]));
+        });
       if constexpr (kKeeps)
         kernel.estimator_.keep(walks.walk, state.ray, flight, alive, [&](std::size_t lane) -> OneWalk& {
           return state.kept[sample_at(state.numbers[kSample], k + lane)];
         });
-      propose(k, walks, alive, ended, flight, rng, step, tally);
+      propose(k, walks, alive, flight, rng, tally);
     }
 
-    /// Computes the next points of the walks.  The numbers of an ended walk stay what they were at its end.
+    /// Computes the next points of the walks.
     template <bool several>
-    [[gnu::always_inline]] void propose(std::size_t k, Walks& walks, Mask alive, Mask ended, LaneFlight<T, N, several>& flight,
-                                        Streams& rng, std::uint32_t step, Tally& tally) {
+    [[gnu::always_inline]] void propose(std::size_t k, Walks& walks, Mask alive, LaneFlight<T, N, several>& flight, Streams& rng,
+                                        Tally& tally) {
       const Mask goes_on = alive & kernel.estimator_.propose(walks.walk, state.ray, flight, rng), ends = alive & !goes_on;
       tally.draws += rng.draws();
-      tally.dead += count(ends);
       if constexpr (requires { kernel.estimator_.real_collisions(walks.walk, state.ray); })
         tally.real += count(ends & kernel.estimator_.real_collisions(walks.walk, state.ray));
-      if (step > 0)
-        walks.each_of_walk([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
-          auto before = lanes;
-          load(before, state.numbers[n], k);
-          lanes = select(ended, before, lanes);
-        });
-      bits(Index(static_cast<typename Index::Number>(step))).store(&state.steps[k], ends);
-      (ended | ends).store(&state.ended[k / N * Mask::kBytes]);
+      store_numbers(ends, static_cast<std::uint32_t>(k), &state.ended[tally.ended]);
+      tally.ended += count(ends);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
         if (n == kPiece && !several) return;
         bits(lanes).store(&state.numbers[n][k]);
       });
       const Pack t = walks.place.position;
       for (std::size_t axis = 0; axis < 3; ++axis)
-        if (moves_along(axis)) (Pack(origin[axis]) + t * Pack(direction[axis])).store(&state.points[axis][k]);
+        if (moves[axis]) (Pack(origin[axis]) + t * Pack(direction[axis])).store(&state.points[axis][k]);
     }
 
     /// Begins what the estimator keeps of each sample.
@@ -288,50 +282,45 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       return kernel.estimator_.result(walks.walk, state.ray);
     }
 
-    /// Writes out the results of ended walks and compacts the others; returns the number of lanes that these take.
-    [[gnu::noinline]] std::size_t close_ranks(std::size_t lanes, Tally& tally) {
-      std::size_t kept = 0, left = 0;
-      for (std::size_t k = 0; k < lanes; k += N) {
-        const Mask dead = Mask::load(&state.ended[k / N * Mask::kBytes]), alive = there(k, tally) & !dead;
-        const auto close = [k](const ClosedRanks<T, N>& ranks, const auto& from, auto& to, std::size_t at) {
-          Pack(ranks(Pack::load(&from[k]).vector())).store(&to[at]);
-        };
-        const ClosedRanks<T, N> close_dead(dead), close_living(alive);
-        for (std::size_t n = 0; n < state.left_walk.size(); ++n)
-          close(close_dead, state.numbers[kWalk + n], state.left_walk[n], left);
-        close(close_dead, state.steps, state.left_steps, left);
-        close(close_dead, state.numbers[kSample], state.left_sample, left);
-        left += count(dead);
+    /// Takes the walks that have ended out of the block; its last walks take their places.  From the last one on, so that a walk
+    /// that moves has not ended.
+    [[gnu::noinline]] void take_out_ended(std::uint32_t step, Tally& tally) {
+      std::size_t walks = tally.walks, left = tally.left;
+      for (std::size_t i = tally.ended; i-- > 0; ++left) {
+        const std::size_t k = state.ended[i], last = --walks;
+        lookups[sample_at(state.numbers[kSample], k)] = step;
+        state.left_sample[left] = state.numbers[kSample][k];
+        for (std::size_t n = 0; n < state.left_walk.size(); ++n) state.left_walk[n][left] = state.numbers[kWalk + n][k];
         for (std::size_t n = 0; n < kNumbers; ++n)
-          if (n != kPiece || rates.has_several()) close(close_living, state.numbers[n], state.numbers[n], kept);
+          if (n != kPiece || rates.has_several()) state.numbers[n][k] = state.numbers[n][last];
         for (std::size_t axis = 0; axis < 3; ++axis)
-          if (moves_along(axis)) close(close_living, state.points[axis], state.points[axis], kept);
-        kept += count(alive);
+          if (moves[axis]) state.points[axis][k] = state.points[axis][last];
       }
-      if constexpr (!kKeeps)
-        for (std::size_t i = 0; i < left; i += N) {
-          Walks walks;
-          walks.each_of_walk([&](auto& number, std::size_t n)
-                                 __attribute__((always_inline)) { load(number, state.left_walk[n - kWalk], i); });
-          const Value answer = this->answer(walks);
-          for (std::size_t c = 0; c < C; ++c) channel(answer, c).store(&state.left_result[c][i]);
-        }
-      for (std::size_t i = 0; i < left; ++i) {
-        const std::size_t sample = sample_at(state.left_sample, i);
-        if constexpr (kKeeps) {
+      tally.lookups += tally.ended * step;
+      tally.walks = walks;
+      tally.left = left;
+      tally.ended = 0;
+    }
+
+    [[gnu::noinline]] void write_results(std::size_t left) {
+      if constexpr (kKeeps) {
+        for (std::size_t i = 0; i < left; ++i) {
+          const std::size_t sample = sample_at(state.left_sample, i);
           kernel.one().finish(state.kept[sample], state.ray);
           store(kernel.one().result(state.kept[sample], state.ray), &values[sample * C]);
-        } else {
-          for (std::size_t c = 0; c < C; ++c) values[sample * C + c] = state.left_result[c][i];
         }
-        lookups[sample] = static_cast<std::uint32_t>(std::bit_cast<typename Index::Number>(state.left_steps[i]));
-        tally.lookups += lookups[sample];
+      } else {
+        for (std::size_t k = 0; k < left; k += N) {
+          Walks walks;
+          walks.each_of_walk([&](auto& number, std::size_t n)
+                                 __attribute__((always_inline)) { load(number, state.left_walk[n - kWalk], k); });
+          const Value answer = this->answer(walks);
+          std::array<std::array<T, N>, C> results;
+          for (std::size_t c = 0; c < C; ++c) channel(answer, c).store(results[c].data());
+          for (std::size_t lane = 0; lane < std::min(N, left - k); ++lane)
+            for (std::size_t c = 0; c < C; ++c) values[sample_at(state.left_sample, k + lane) * C + c] = results[c][lane];
+        }
       }
-      lanes = (kept + N - 1) / N * N;
-      for (std::size_t k = 0; k < lanes; k += N) Mask(false).store(&state.ended[k / N * Mask::kBytes]);
-      tally.dead = lanes - kept;
-      tally.walks = kept;
-      return lanes;
     }
 
     /// Reads a register of a row, from the k-th walk on.

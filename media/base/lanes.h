@@ -211,7 +211,8 @@ class LaneIndex {
   LaneIndex() = default;
   LaneIndex(Vector vector) : vector_(vector) {}
   explicit LaneIndex(Number x) : vector_(hn::Set(Tag(), x)) {}
-  static LaneIndex counting_from(Number first) { return hn::Iota(Tag(), first); }
+  /// Highway 1.0.3 writes an Iota number by number where it does not begin at a constant, and reads it at once, which waits.
+  static LaneIndex counting_from(Number first) { return hn::Add(hn::Iota(Tag(), 0), hn::Set(Tag(), first)); }
   static LaneIndex load(const Number* from) { return hn::LoadU(Tag(), from); }
   void store(Number* to) const { hn::StoreU(vector_, Tag(), to); }
   Vector vector() const { return vector_; }
@@ -244,65 +245,32 @@ class LaneIndex {
   Vector vector_;
 };
 
-/// Closes ranks: the lanes of a mask move side by side to the front, in their order.
+/// Per mask of 8 lanes its lanes in order, a byte each.
+inline constexpr auto kLanesOfMask = [] {
+  std::array<std::array<std::uint8_t, 8>, 256> all{};
+  for (unsigned mask = 0; mask < 256; ++mask)
+    for (unsigned lane = 0, at = 0; lane < 8; ++lane)
+      if (mask >> lane & 1) all[mask][at++] = static_cast<std::uint8_t>(lane);
+  return all;
+}();
+
+/// Writes `first` plus the number of each lane of a mask, in order; N numbers in all, of which those after them mean nothing.
 template <class T, std::size_t N>
-class ClosedRanks {
- public:
-  explicit ClosedRanks(LaneMask<T, N> kept) {
-    const typename LaneIndex<T, N>::Tag integers;
-    if constexpr (N > 8) {
-      const auto mask = hn::RebindMask(integers, kept.mask());
-      order_ = hn::IndicesFromVec(hn::FixedTag<T, N>(), hn::Compress(hn::Iota(integers, 0), mask));
-    } else if constexpr (N > 1) {
-      // Highway 1.0.3 copies its table of orders to the stack at every call.
-      std::uint8_t bits[8];
-      hn::StoreMaskBits(hn::FixedTag<T, N>(), kept.mask(), bits);
-      const std::uint64_t& packed = kOrders[bits[0]];
-      if constexpr (sizeof(T) == 8) {
-        const hn::RebindToUnsigned<decltype(integers)> numbers;
-        const auto lanes = hn::And(hn::Shr(hn::Set(numbers, packed), shifts(numbers)), hn::Set(numbers, 7));
-        order_ = hn::IndicesFromVec(hn::FixedTag<T, N>(), hn::BitCast(integers, lanes));
-      } else {
-        const hn::Rebind<std::uint8_t, decltype(integers)> bytes;
-        const auto lanes = hn::PromoteTo(integers, hn::LoadU(bytes, reinterpret_cast<const std::uint8_t*>(&packed)));
-        order_ = hn::IndicesFromVec(hn::FixedTag<T, N>(), lanes);
-      }
-    }
+void store_numbers(LaneMask<T, N> lanes, std::uint32_t first, std::uint32_t* out) {
+  const hn::FixedTag<std::uint32_t, N> numbers;
+  if constexpr (N > 8) {
+    hn::StoreU(hn::Compress(hn::Add(hn::Iota(numbers, 0), hn::Set(numbers, first)), hn::RebindMask(numbers, lanes.mask())),
+               numbers, out);
+  } else if constexpr (N > 1) {
+    // Highway 1.0.3 copies its table of orders to the stack at every call.
+    std::uint8_t bits[8];
+    hn::StoreMaskBits(hn::FixedTag<T, N>(), lanes.mask(), bits);
+    const auto chosen = hn::LoadU(hn::FixedTag<std::uint8_t, N>(), kLanesOfMask[bits[0]].data());
+    hn::StoreU(hn::Add(hn::PromoteTo(numbers, chosen), hn::Set(numbers, first)), numbers, out);
+  } else {
+    *out = first;
   }
-
-  /// Of any register with N lanes as wide as T.
-  template <class Vector>
-  Vector operator()(Vector lanes) const {
-    if constexpr (N == 1)
-      return lanes;
-    else {
-      const hn::FixedTag<T, N> numbers;
-      return hn::BitCast(hn::DFromV<Vector>(), hn::TableLookupLanes(hn::BitCast(numbers, lanes), order_));
-    }
-  }
-
- private:
-  /// Per mask of 8 lanes the lanes kept, a byte each.
-  static constexpr auto kOrders = [] {
-    std::array<std::uint64_t, 256> orders{};
-    for (unsigned mask = 0; mask < 256; ++mask)
-      for (unsigned lane = 0, at = 0; lane < 8; ++lane)
-        if (mask >> lane & 1) orders[mask] |= std::uint64_t{lane} << (8 * at++);
-    return orders;
-  }();
-
-  static auto shifts(auto integers) { return hn::ShiftLeft<3>(hn::Iota(integers, 0)); }
-
-  struct Nothing {};
-  template <std::size_t n>
-  static auto indices() {
-    if constexpr (n == 1)
-      return Nothing();
-    else
-      return hn::IndicesFromVec(hn::FixedTag<T, n>(), hn::Iota(typename LaneIndex<T, n>::Tag(), 0));
-  }
-  decltype(indices<N>()) order_;
-};
+}
 
 /// Sums of the numbers f(i, pack) over 0 <= i < n, an array of packs of the entries from i on, of as many as `pack` has: a whole
 /// register, or one.
