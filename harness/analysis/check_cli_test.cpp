@@ -101,6 +101,18 @@ TEST_F(Check, OnlyOpenVerdictsAreNoSuccess) {
   EXPECT_NE(read("out").find(" samples a ray: raise \"max_samples_per_ray\""), std::string::npos) << read("out");
 }
 
+/// A larger pilot decides what no number of samples after it does.
+TEST_F(Check, APilotThatIsNotTrustedIsNoHighVariance) {
+  write("p.json", config(R"("rays":"single","quantity":"radiance","samples_per_ray":64,
+      "transport":{"environment":1,"roulette_from":1},"verdict":{"epsilon":0.02},"matrix":{"estimator":["hero_wavelength"],
+      "medium":[{"type":"linear","spectrum":[0.5,1,2],"albedo":1}]})"));
+  ASSERT_EQ(run("run p.json -o r.json"), 0) << read("err");
+  EXPECT_EQ(run("check r.json --all"), 77) << read("out");
+  EXPECT_NE(read("out").find("a pilot's is not to be trusted"), std::string::npos) << read("out");
+  EXPECT_NE(read("out").find("INCONCLUSIVE as planned whatever \"max_samples_per_ray\" is"), std::string::npos) << read("out");
+  EXPECT_EQ(read("out").find("the variance is too high"), std::string::npos) << read("out");
+}
+
 TEST_F(Check, NoOneIsToldToDrawMoreThanAnyRunCan) {
   write("d.json", config(R"("rays":"single","samples_per_ray":100,"matrix":{"estimator":["delta"],
       "medium":[{"type":"homogeneous","extinction":[2,40]}]})"));

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <utility>
 
@@ -68,6 +69,14 @@ std::string reasons_of_untested(const RunRecord& run) {
 /// Samples a ray: minutes of CPU for each ray at 100 ns a sample.
 constexpr std::uint64_t kMostAdvised = 1'000'000'000;
 
+/// Whether a test of the mean had no bet on one side, as where a pilot's variance is not trusted: no number of samples was
+/// planned.
+bool unplanned_by_pilot(const VerdictRecord& verdict) {
+  return std::any_of(verdict.tests.begin(), verdict.tests.end(), [](const TestRecord& test) {
+    return test.channel >= 0 && !test.deterministic() && !(std::isfinite(test.log_e_low) && std::isfinite(test.log_e_high));
+  });
+}
+
 /// What keeps a run whose cells are good from being a success, and what was left out on purpose.
 std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary) {
   std::vector<std::string> lines;
@@ -89,12 +98,14 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
   lines.insert(lines.end(), summary.disagreements.begin(), summary.disagreements.end());
   // Of samples that were handed in, no key allows more.
   std::uint64_t wanted = 0;
-  std::size_t hopeless = 0;
+  std::size_t hopeless = 0, unplanned = 0;
   for (const CellRecord& record : run.cells) {
     if (record.tracker.unrepeatable || kind_of(record) != Kind::expected_open ||
         record.verdict->planned <= record.verdict->affordable)
       continue;
-    if (record.verdict->planned > kMostAdvised)
+    if (record.verdict->planned > kMostAdvised && unplanned_by_pilot(*record.verdict))
+      ++unplanned;
+    else if (record.verdict->planned > kMostAdvised)
       ++hopeless;
     else
       wanted = std::max(wanted, record.verdict->planned);
@@ -109,6 +120,11 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
         fmt::format("{} INCONCLUSIVE as planned need{} more than {:.0e} samples a ray: the variance is too high for this epsilon",
                     hopeless == 1 ? "1 cell that is" : fmt::format("{} cells that are", hopeless), hopeless == 1 ? "s" : "",
                     static_cast<double>(kMostAdvised)));
+  if (unplanned > 0)
+    lines.push_back(
+        fmt::format("{} INCONCLUSIVE as planned whatever \"max_samples_per_ray\" is: `check --all` says why; a larger "
+                    "\"samples_per_ray\" makes a larger pilot",
+                    unplanned == 1 ? "1 cell is" : fmt::format("{} cells are", unplanned)));
   lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());
   if (!summary.nothing_proven.empty()) lines.push_back(summary.nothing_proven);
   for (const ClaimFinding& one : summary.findings)

@@ -58,7 +58,9 @@ std::string failures_beside_the_mean(const VerdictRecord& verdict) {
 /// Why a sampled cell has no verdict; results of older versions say it of no cell.
 std::string why_untested(const CellRecord& record) {
   if (!record.reason.empty()) return record.reason;
-  if (record.verdict) return "no mean was tested";
+  if (record.verdict)
+    return record.samples == record.rays ? "no mean was tested: one sample a ray leaves none beside the pilot"
+                                         : "no mean was tested";
   return record.claims == "biased" ? "the estimator claims nothing" : "no verdict";
 }
 
