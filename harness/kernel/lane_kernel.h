@@ -235,7 +235,8 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
         audit_majorant(largest(extinction), majorant.template rate<several>(flight.piece()), alive, tally.violations,
                        counters.largest_violation);
       kernel.estimator_.consume(walks.walk, state.ray, flight, extinction, rng);
-      // Weights that went on shrinking in idle lanes would become denormal, and such numbers take hundreds of cycles.
+      // Weights that went on shrinking in idle lanes would become denormal, and such numbers take hundreds of cycles.  Truths go
+      // on: a tracker may ask whether one holds in all lanes.
       if (k + N > tally.walks)
         walks.each_of_walk([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
           if constexpr (std::is_same_v<std::remove_cvref_t<decltype(lanes)>, Pack>)

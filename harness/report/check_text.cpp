@@ -121,10 +121,10 @@ std::vector<std::string> remarks_of(const RunRecord& run, const Summary& summary
                     hopeless == 1 ? "1 cell that is" : fmt::format("{} cells that are", hopeless), hopeless == 1 ? "s" : "",
                     static_cast<double>(kMostAdvised)));
   if (unplanned > 0)
-    lines.push_back(
-        fmt::format("{} INCONCLUSIVE as planned whatever \"max_samples_per_ray\" is: `check --all` says why; a larger "
-                    "\"samples_per_ray\" makes a larger pilot",
-                    unplanned == 1 ? "1 cell is" : fmt::format("{} cells are", unplanned)));
+    lines.push_back(fmt::format(
+        "{} INCONCLUSIVE as planned whatever \"max_samples_per_ray\" is; `check --all` says why. Where a pilot is not "
+        "trusted, a larger \"samples_per_ray\" makes a larger one",
+        unplanned == 1 ? "1 cell is" : fmt::format("{} cells are", unplanned)));
   lines.insert(lines.end(), summary.undecided_trackers.begin(), summary.undecided_trackers.end());
   if (!summary.nothing_proven.empty()) lines.push_back(summary.nothing_proven);
   for (const ClaimFinding& one : summary.findings)

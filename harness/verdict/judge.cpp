@@ -114,7 +114,7 @@ std::optional<std::string> far_off(const PreparedCell& prepared, const TestPlan&
     const std::string errors = squared > 0
                                    ? fmt::format("{:.3g} standard errors of the samples", std::abs(error) / std::sqrt(squared))
                                    : "and no variance";
-    return fmt::format("biased, or samples too rare to be drawn matter: mean {:.6g}, expected {:.6g} ({:+.2g}, {})",
+    return fmt::format("biased, or its mean rests on samples too rare to be drawn: mean {:.6g}, expected {:.6g} ({:+.2g}, {})",
                        expected + error, expected, error, errors);
   }
   return std::nullopt;

@@ -37,9 +37,6 @@ class Lanes {
 
   static Lanes load(const T* from) { return hn::LoadU(Tag(), from); }
   void store(T* to) const { hn::StoreU(vector_, Tag(), to); }
-  /// Into the lanes of the mask; the others are rewritten as they are, since AVX2's masked store takes longer than a logarithm on
-  /// some processors.
-  void store(T* to, LaneMask<T, N> lanes) const { select(lanes, *this, load(to)).store(to); }
   Vector vector() const { return vector_; }
   friend std::array<T, N> numbers(Lanes a) {
     std::array<T, N> x;
@@ -127,26 +124,11 @@ class LaneMask {
  public:
   using Tag = hn::FixedTag<T, N>;
   using Mask = hn::Mask<Tag>;
-  static constexpr bool kBits = sizeof(Mask) < sizeof(hn::Vec<Tag>);
-  static constexpr std::size_t kBytes = kBits ? 8 : sizeof(hn::Vec<Tag>);
 
   LaneMask() = default;
   LaneMask(Mask mask) : mask_(mask) {}
   LaneMask(bool all) : LaneMask(first(all ? N : 0)) {}
   static LaneMask first(std::size_t n) { return hn::FirstN(Tag(), n); }
-  /// From and to kBytes bytes: as bits where a mask is bits, and as the numbers that it is elsewhere.
-  static LaneMask load(const std::uint8_t* from) {
-    if constexpr (kBits)
-      return hn::LoadMaskBits(Tag(), from);
-    else
-      return hn::MaskFromVec(hn::LoadU(Tag(), reinterpret_cast<const T*>(from)));
-  }
-  void store(std::uint8_t* to) const {
-    if constexpr (kBits)
-      hn::StoreMaskBits(Tag(), mask_, to);
-    else
-      hn::StoreU(hn::VecFromMask(Tag(), mask_), Tag(), reinterpret_cast<T*>(to));
-  }
   Mask mask() const { return mask_; }
 
   friend LaneMask operator&(LaneMask a, LaneMask b) { return hn::And(a.mask_, b.mask_); }
