@@ -190,6 +190,7 @@ TEST_F(Cli, MessagesNameTheMistakeAndTheRemedy) {
       {"list", "expected one of estimators, media"},
       {"run c.json --thread 2", "unknown option \"--thread\"; did you mean \"--threads\"?"},
       {"run c.json --thread=2", "did you mean \"--threads\"?"},
+      {"run c.json -threads 2", "unknown option \"-threads\"; did you mean \"--threads\"?"},
       {"merge r.json", "--output is required; `nullmark merge --help` explains it"},
       {"list quantites", "did you mean \"quantities\"?"},
       {"schema confg", "did you mean \"config\"?"},

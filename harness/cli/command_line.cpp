@@ -122,8 +122,11 @@ class CommandLine {
     std::vector<std::string> names;
     for (const CLI::Option* option : app_.get_subcommand(words[1])->get_options())
       for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-    for (std::size_t i = 2; i < words.size() && words[i] != "--"; ++i)
-      if (words[i].rfind("--", 0) == 0) expect_one_of(words[i].substr(0, words[i].find('=')), names, "option");
+    for (std::size_t i = 2; i < words.size() && words[i] != "--"; ++i) {
+      const std::string word = words[i].substr(0, words[i].find('='));
+      const bool lacks_a_dash = std::find(names.begin(), names.end(), "-" + word) != names.end();
+      if (word.rfind("--", 0) == 0 || lacks_a_dash) expect_one_of(word, names, "option");
+    }
   }
 
   template <class Action>
