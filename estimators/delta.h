@@ -52,20 +52,21 @@ struct DeltaTracking {
   }
 
   struct Grey {
-    Truth<Value> done = false;
+    Truth<Value> done;
   };
   struct Shared {
     Value transmittance;
-    Truth<Value> done = false;
+    Truth<Value> done;
   };
   struct Separable : Shared {
-    int walking = 0;  ///< the channel that walks, where each walks for itself
+    int walking;  ///< the channel that walks, where each walks for itself
   };
   using Walk = std::conditional_t<kSeparable, Separable, std::conditional_t<kChromatic, Shared, Grey>>;
 
   void init(Walk& walk, const auto& ray, auto& flight, auto&) const {
-    walk = {};
+    walk.done = false;
     if constexpr (kChromatic) walk.transmittance = ray.value(1);
+    if constexpr (kSeparable) walk.walking = 0;
     if (!ray.per_channel.empty()) flight.start(ray.per_channel[0]);
   }
 

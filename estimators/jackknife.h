@@ -59,12 +59,16 @@ struct Jackknife {
     ray.naive = mean == "naive";
   }
 
+  struct Marches {
+    Value mean, squares;  ///< Xbar and sum (X - Xbar)^2
+  };
   struct Walk {
-    Value sum, mean, squares;  ///< of the march at hand; over complete marches: Xbar and sum (X - Xbar)^2
+    Value sum;  ///< of the march at hand
     Distance<Value> offset;
+    Marches complete;
   };
 
-  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(0), ray.value(0), ray.value(0), 0}; }
+  void init(Walk& walk, const auto& ray, auto&, auto&) const { walk = {ray.value(0), 0, {ray.value(0), ray.value(0)}}; }
 
   bool propose(Walk& walk, const auto& ray, auto& flight, auto& rng) const {
     if (flight.lookups() == ray.lookups) return false;
@@ -76,17 +80,20 @@ struct Jackknife {
 
   void consume(Walk& walk, const auto& ray, const auto& at, const Value& extinction, auto&) const {
     walk.sum += extinction;
-    if (at.lookups() % ray.steps != 0) return;
-    const Value x = walk.sum * ray.step, ahead = x - walk.mean;
-    walk.mean += ahead / static_cast<Real>(at.lookups() / ray.steps);
-    walk.squares += ahead * (x - walk.mean);
+    if (!completes(ray, at.lookups())) return;
+    Marches& marches = walk.complete;
+    const Value x = walk.sum * ray.step, ahead = x - marches.mean;
+    marches.mean += ahead / static_cast<Real>(at.lookups() / ray.steps);
+    marches.squares += ahead * (x - marches.mean);
     walk.sum = ray.value(0);
   }
 
+  bool completes(const auto& ray, std::uint32_t lookups) const { return lookups % ray.steps == 0; }
+
   Value result(const Walk& walk, const auto& ray) const {
-    const Value naive = exponential(Value(-walk.mean));
+    const Value naive = exponential(Value(-walk.complete.mean));
     if (ray.naive) return naive;
-    const Value deviation = signed_root(Value(larger(Value(walk.squares / m), 0)));
+    const Value deviation = signed_root(Value(larger(Value(walk.complete.squares / m), 0)));
     if (m == 2) return naive * cosine(Value(smaller(deviation, 30000)));  // Xbar is no less, and e^{-Xbar} is 0 beyond
     return naive * one_by_one(deviation, [this](Real s) { return jackknife_factor(m, s); });
   }

@@ -105,7 +105,9 @@ TEST(Flight, TravelsBothWaysToWhereItLands) {
     const Real depth = i % 5 == 0 ? rates.depth_before(static_cast<std::size_t>(i / 5) % 20) : rng.uniform() * total * 1.05;
     ASSERT_EQ(travels.travel_to(depth), lands.land(depth)) << depth;
     ASSERT_EQ(travels.position(), lands.position()) << depth;
-    if (depth < total) ASSERT_EQ(travels.piece(), lands.piece()) << depth;
+    if (depth < total) {
+      ASSERT_EQ(travels.piece(), lands.piece()) << depth;
+    }
   }
 }
 

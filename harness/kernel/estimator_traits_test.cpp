@@ -43,6 +43,9 @@ struct TheoryWithoutQuantity : Delta {
 struct OrderOfNothing : Delta {
   Real order() const { return 1; }
 };
+struct CompletesByWalk : Jackknife<Real> {
+  bool completes(const Walk&) const { return true; }
+};
 struct CheckOfARay : Delta {
   void check(const RayData&) const {}
 };
@@ -56,6 +59,7 @@ TEST(EstimatorTraits, ASlipInASignatureIsSeenByItsName) {
   EXPECT_TRUE(detail::names_event<EventTemplateWithoutFlight> && !Traits<EventTemplateWithoutFlight>::kEvent);
   EXPECT_TRUE(detail::names_theory<TheoryWithoutQuantity> && !Traits<TheoryWithoutQuantity>::kTheory);
   EXPECT_TRUE(detail::names_order<OrderOfNothing> && !Traits<OrderOfNothing>::kOrder);
+  EXPECT_TRUE(detail::names_completes<CompletesByWalk> && !Traits<CompletesByWalk>::kCompletes);
   EXPECT_TRUE(detail::names_check<CheckOfARay> && !Traits<CheckOfARay>::kCheck);
 }
 

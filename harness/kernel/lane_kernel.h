@@ -68,8 +68,17 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
           walk, [&](auto& lanes) __attribute__((always_inline)) { visit(lanes, n++); });
     }
   };
-  static constexpr std::size_t kNumbers = sizeof(Walks) / sizeof(Pack), kSample = 0, kPiece = 1, kWalk = 4;
-
+  static constexpr std::size_t kSample = 0, kPiece = 1, kWalk = 4, kStream = kWalk + sizeof(typename E::Walk) / sizeof(Pack);
+  static constexpr std::size_t kNumbers = sizeof(Walks) / sizeof(Pack);
+  /// From this number of the walk on only lookups that complete something change it.
+  static constexpr std::size_t kComplete = [] {
+    if constexpr (Traits::kCompletes) {
+      static_assert(offsetof(typename E::Walk, complete) + sizeof(E::Walk::complete) == sizeof(typename E::Walk),
+                    "with `completes`, the last member of Walk is `complete`");
+      return kStream - sizeof(E::Walk::complete) / sizeof(Pack);
+    }
+    return kStream;
+  }();
   /// Rows of a multiple of 2 KiB would let loads wait for stores to other rows, whose addresses have the same low bits.
   static constexpr std::size_t kRow = kBlock + HWY_MAX_BYTES / sizeof(T);
   struct State final : Base::State {
@@ -79,7 +88,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     alignas(HWY_MAX_BYTES) std::array<T, kRow * C> extinction{};
     std::array<std::uint32_t, kRow> ended{};  ///< lanes of the walks that end with this step
     /// Of the walks that have left: their numbers and samples; whole registers are read at the end.
-    alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, sizeof(typename E::Walk) / sizeof(Pack)> left_walk{};
+    alignas(HWY_MAX_BYTES) std::array<std::array<T, kRow>, kStream - kWalk> left_walk{};
     alignas(HWY_MAX_BYTES) std::array<T, kRow> left_sample{};
     std::array<OneWalk, kKeeps ? kBlock : 0> kept;  ///< of each sample of the block
   };
@@ -217,16 +226,18 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     template <bool several>
     [[gnu::always_inline]] void go_on(std::uint32_t step, Tally& tally) {
       Run here = *this;
-      for (std::size_t k = 0; k < tally.walks; k += N) here.template step_on<several>(k, step, tally);
+      bool completes = true;
+      if constexpr (Traits::kCompletes) completes = kernel.estimator_.completes(state.ray, step);
+      for (std::size_t k = 0; k < tally.walks; k += N) here.template step_on<several>(k, step, completes, tally);
     }
 
     template <bool several>
-    [[gnu::always_inline]] void step_on(std::size_t k, std::uint32_t step, Tally& tally) {
+    [[gnu::always_inline]] void step_on(std::size_t k, std::uint32_t step, bool completes, Tally& tally) {
       const Mask alive = there(k, tally);
       Walks walks;
       walks.place.piece = Index(0);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
-        if (n != kPiece || several) load(lanes, state.numbers[n], k);
+        if (may_change<several>(n, completes)) load(lanes, state.numbers[n], k);
       });
       LaneFlight<T, N, several> flight(rates, walks.place, step);
       Streams rng(walks.stream, alive, std::min(N, tally.walks - k));
@@ -240,19 +251,25 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       if (k + N > tally.walks)
         walks.each_of_walk([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
           if constexpr (std::is_same_v<std::remove_cvref_t<decltype(lanes)>, Pack>)
-            lanes = select(alive, lanes, Pack::load(&state.numbers[n][k]));
+            if (may_change<several>(n, completes)) lanes = select(alive, lanes, Pack::load(&state.numbers[n][k]));
         });
       if constexpr (kKeeps)
         kernel.estimator_.keep(walks.walk, state.ray, flight, alive, [&](std::size_t lane) -> OneWalk& {
           return state.kept[sample_at(state.numbers[kSample], k + lane)];
         });
-      propose(k, walks, alive, flight, rng, tally);
+      propose(k, walks, alive, flight, rng, tally, completes);
+    }
+
+    /// Whether a step may change a number.
+    template <bool several>
+    static bool may_change(std::size_t n, bool completes) {
+      return (n != kPiece || several) && (completes || n < kComplete || n >= kStream);
     }
 
     /// Computes the next points of the walks.
     template <bool several>
     [[gnu::always_inline]] void propose(std::size_t k, Walks& walks, Mask alive, LaneFlight<T, N, several>& flight, Streams& rng,
-                                        Tally& tally) {
+                                        Tally& tally, bool completes = true) {
       const Mask goes_on = alive & kernel.estimator_.propose(walks.walk, state.ray, flight, rng), ends = alive & !goes_on;
       tally.draws += rng.draws();
       if constexpr (requires { kernel.estimator_.real_collisions(walks.walk, state.ray); })
@@ -260,15 +277,13 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       store_numbers(ends, static_cast<std::uint32_t>(k), &state.ended[tally.ended]);
       tally.ended += count(ends);
       walks.each_moving([&](auto& lanes, std::size_t n) __attribute__((always_inline)) {
-        if (n == kPiece && !several) return;
-        bits(lanes).store(&state.numbers[n][k]);
+        if (may_change<several>(n, completes)) bits(lanes).store(&state.numbers[n][k]);
       });
       const Pack t = walks.place.position;
       for (std::size_t axis = 0; axis < 3; ++axis)
         if (moves[axis]) (Pack(origin[axis]) + t * Pack(direction[axis])).store(&state.points[axis][k]);
     }
 
-    /// Begins what the estimator keeps of each sample.
     [[gnu::noinline]] void begin_kept(std::size_t count) {
       for (std::size_t i = 0; i < count; ++i) kernel.one().begin(state.kept[i], state.ray);
     }
@@ -286,6 +301,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     /// Takes the walks that have ended out of the block; its last walks take their places.  From the last one on, so that a walk
     /// that moves has not ended.
     [[gnu::noinline]] void take_out_ended(std::uint32_t step, Tally& tally) {
+      if (tally.ended == tally.walks) return take_out_all(step, tally);
       std::size_t walks = tally.walks, left = tally.left;
       for (std::size_t i = tally.ended; i-- > 0; ++left) {
         const std::size_t k = state.ended[i], last = --walks;
@@ -301,6 +317,18 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       tally.walks = walks;
       tally.left = left;
       tally.ended = 0;
+    }
+
+    /// The walks of a march end together.
+    void take_out_all(std::uint32_t step, Tally& tally) {
+      const std::size_t walks = tally.walks;
+      for (std::size_t k = 0; k < walks; ++k) lookups[sample_at(state.numbers[kSample], k)] = step;
+      std::copy_n(state.numbers[kSample].begin(), walks, state.left_sample.begin() + tally.left);
+      for (std::size_t n = 0; n < state.left_walk.size(); ++n)
+        std::copy_n(state.numbers[kWalk + n].begin(), walks, state.left_walk[n].begin() + tally.left);
+      tally.lookups += walks * step;
+      tally.left += walks;
+      tally.walks = tally.ended = 0;
     }
 
     [[gnu::noinline]] void write_results(std::size_t left) {

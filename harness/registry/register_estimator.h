@@ -35,6 +35,7 @@ std::vector<std::pair<const char*, bool>> optional_members() {
           {"needs_optical_depth", Traits::kMayNeedOpticalDepth},
           {"kLanes", lanes},
           {"Kept", kept},
+          {"completes", Traits::kCompletes},
           {"kGreyOnly", Traits::kGreyOnly},
           {"kIgnoresMajorant", Traits::kIgnoresMajorant},
           {"kHeavySamples", samples},
