@@ -151,6 +151,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     std::uint32_t* lookups;
     Counters& counters;
     Rates rates = {}, majorant = Rates(state.ray.majorant);
+    Pack allowed = largest_allowed(majorant.template rate<false>(Index(0)));  ///< where the rates have one piece
     std::array<T, 3> origin = narrowed(context.local.origin), direction = narrowed(context.local.direction);
     /// Along which axes; coordinates along the others keep their value from the begin of the block.
     std::array<bool, 3> moves = {direction[0] != 0, direction[1] != 0, direction[2] != 0};
@@ -242,9 +243,11 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       LaneFlight<T, N, several> flight(rates, walks.place, step);
       Streams rng(walks.stream, alive, std::min(N, tally.walks - k));
       const Value extinction = extinction_at(k);
-      if constexpr (!Traits::kIgnoresMajorant)
-        audit_majorant(largest(extinction), majorant.template rate<several>(flight.piece()), alive, tally.violations,
+      if constexpr (!Traits::kIgnoresMajorant) {
+        const Pack bound = majorant.template rate<several>(flight.piece());
+        audit_majorant(largest(extinction), bound, several ? largest_allowed(bound) : allowed, alive, tally.violations,
                        counters.largest_violation);
+      }
       kernel.estimator_.consume(walks.walk, state.ray, flight, extinction, rng);
       // Weights that went on shrinking in idle lanes would become denormal, and such numbers take hundreds of cycles.  Truths go
       // on: a tracker may ask whether one holds in all lanes.
@@ -302,21 +305,17 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     /// that moves has not ended.
     [[gnu::noinline]] void take_out_ended(std::uint32_t step, Tally& tally) {
       if (tally.ended == tally.walks) return take_out_all(step, tally);
-      std::size_t walks = tally.walks, left = tally.left;
-      for (std::size_t i = tally.ended; i-- > 0; ++left) {
-        const std::size_t k = state.ended[i], last = --walks;
+      tally.lookups += tally.ended * step;
+      for (; tally.ended > 0; ++tally.left) {
+        const std::size_t k = state.ended[--tally.ended], last = --tally.walks;
         lookups[sample_at(state.numbers[kSample], k)] = step;
-        state.left_sample[left] = state.numbers[kSample][k];
-        for (std::size_t n = 0; n < state.left_walk.size(); ++n) state.left_walk[n][left] = state.numbers[kWalk + n][k];
+        state.left_sample[tally.left] = state.numbers[kSample][k];
+        for (std::size_t n = 0; n < state.left_walk.size(); ++n) state.left_walk[n][tally.left] = state.numbers[kWalk + n][k];
         for (std::size_t n = 0; n < kNumbers; ++n)
           if (n != kPiece || rates.has_several()) state.numbers[n][k] = state.numbers[n][last];
         for (std::size_t axis = 0; axis < 3; ++axis)
           if (moves[axis]) state.points[axis][k] = state.points[axis][last];
       }
-      tally.lookups += tally.ended * step;
-      tally.walks = walks;
-      tally.left = left;
-      tally.ended = 0;
     }
 
     /// The walks of a march end together.

@@ -20,12 +20,18 @@ inline void audit_majorant(Real extinction, Real bound, Counters& counters) {
     count_violation(extinction, bound, counters);
 }
 
-/// The same for the walks of a register that are `alive`.  All of it is inlined: a call would make the loop keep its registers in
-/// memory.
+/// The largest extinction under a bound that is no violation but rounding.
 template <class T, std::size_t N>
-[[gnu::always_inline]] inline void audit_majorant(Lanes<T, N> extinction, Lanes<T, N> bound, LaneMask<T, N> alive,
-                                                  std::uint64_t& violations, Real& largest_violation) {
-  LaneMask<T, N> exceeding = extinction > bound * Lanes<T, N>(1 + kBoundRounding<T>);
+Lanes<T, N> largest_allowed(Lanes<T, N> bound) {
+  return bound * Lanes<T, N>(1 + kBoundRounding<T>);
+}
+
+/// The same for the walks of a register that are `alive`; `allowed` is the bound's.  All of it is inlined: a call would make the
+/// loop keep its registers in memory.
+template <class T, std::size_t N>
+[[gnu::always_inline]] inline void audit_majorant(Lanes<T, N> extinction, Lanes<T, N> bound, Lanes<T, N> allowed,
+                                                  LaneMask<T, N> alive, std::uint64_t& violations, Real& largest_violation) {
+  LaneMask<T, N> exceeding = extinction > allowed;
   if (none(exceeding)) return;
   exceeding = exceeding & alive;
   violations += count(exceeding);
