@@ -133,9 +133,9 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
   /// Counts of a block.
   struct Tally {
     std::uint64_t draws = 0, lookups = 0, real = 0, violations = 0;
-    std::size_t walks = 0;  ///< in the first lanes
+    std::size_t count = 0;  ///< of walks
+    std::size_t walks = 0;  ///< that have not left, in the first lanes
     std::size_t ended = 0;  ///< of them, with this step
-    std::size_t left = 0;   ///< those before
   };
 
   /// One block of samples in progress.  Code that runs once per block is not inlined, and all of a step is, so the code of a step
@@ -163,7 +163,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     }
 
     [[gnu::flatten]] void block(std::size_t count) {
-      Tally tally{.walks = count};
+      Tally tally{.count = count, .walks = count};
       if constexpr (kKeeps) begin_kept(count);
       const Medium* field = &medium;
       // One number a lookup, multiplied in registers, takes less time than a spectrum in memory.
@@ -187,7 +187,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
           go_on<false>(step, tally);
         take_out_ended(step, tally);
       }
-      write_results(tally.left);
+      write_results(count - tally.walks);
       counters.draws += tally.draws;
       counters.lookups += tally.lookups;
       counters.violations += tally.violations;
@@ -302,15 +302,18 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
     }
 
     /// Takes the walks that have ended out of the block; its last walks take their places.  From the last one on, so that a walk
-    /// that moves has not ended.
+    /// that moves has not ended.  The walks of a march end together, and leave row by row.
     [[gnu::noinline]] void take_out_ended(std::uint32_t step, Tally& tally) {
-      if (tally.ended == tally.walks) return take_out_all(step, tally);
-      tally.lookups += tally.ended * step;
-      for (; tally.ended > 0; ++tally.left) {
-        const std::size_t k = state.ended[--tally.ended], last = --tally.walks;
+      const std::size_t ended = tally.ended, stay = tally.walks - ended;
+      tally.lookups += ended * step;
+      tally.walks = stay;
+      tally.ended = 0;
+      if (stay == 0 && ended > N) return take_out_rows(ended, step, tally.count - ended);
+      for (std::size_t i = ended; i-- > 0;) {
+        const std::size_t k = state.ended[i], last = stay + i, left = tally.count - 1 - last;
         lookups[sample_at(state.numbers[kSample], k)] = step;
-        state.left_sample[tally.left] = state.numbers[kSample][k];
-        for (std::size_t n = 0; n < state.left_walk.size(); ++n) state.left_walk[n][tally.left] = state.numbers[kWalk + n][k];
+        state.left_sample[left] = state.numbers[kSample][k];
+        for (std::size_t n = 0; n < state.left_walk.size(); ++n) state.left_walk[n][left] = state.numbers[kWalk + n][k];
         for (std::size_t n = 0; n < kNumbers; ++n)
           if (n != kPiece || rates.has_several()) state.numbers[n][k] = state.numbers[n][last];
         for (std::size_t axis = 0; axis < 3; ++axis)
@@ -318,16 +321,11 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
       }
     }
 
-    /// The walks of a march end together.
-    void take_out_all(std::uint32_t step, Tally& tally) {
-      const std::size_t walks = tally.walks;
-      for (std::size_t k = 0; k < walks; ++k) lookups[sample_at(state.numbers[kSample], k)] = step;
-      std::copy_n(state.numbers[kSample].begin(), walks, state.left_sample.begin() + tally.left);
+    void take_out_rows(std::size_t ended, std::uint32_t step, std::size_t left) {
+      for (std::size_t k = 0; k < ended; ++k) lookups[sample_at(state.numbers[kSample], k)] = step;
+      std::copy_n(state.numbers[kSample].begin(), ended, state.left_sample.begin() + left);
       for (std::size_t n = 0; n < state.left_walk.size(); ++n)
-        std::copy_n(state.numbers[kWalk + n].begin(), walks, state.left_walk[n].begin() + tally.left);
-      tally.lookups += walks * step;
-      tally.left += walks;
-      tally.walks = tally.ended = 0;
+        std::copy_n(state.numbers[kWalk + n].begin(), ended, state.left_walk[n].begin() + left);
     }
 
     [[gnu::noinline]] void write_results(std::size_t left) {
