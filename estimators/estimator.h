@@ -96,9 +96,9 @@ namespace nullmark {
 //       kept(k); numbers(x) are the lanes of x, and as_bits(mask) has lane k as bit k.  A walk without a lookup is never kept. At
 //       a walk's end lanes call finish(kept, ray) and result(kept, ray); the plain loop calls init, which may begin likewise, and
 //       result alone
-//   bool completes(const RayData&, std::uint32_t lookups) const
-//       with kLanes: the lookups that change `complete`, the last member of Walk and a struct of its own.  Lanes leave it in
-//       memory at all others; jackknife.h is an example
+//   bool completes(const auto& ray, std::uint32_t lookups) const
+//       with kLanes: whether the consume that sees at.lookups() == lookups changes `complete`, the last member of Walk.  At other
+//       lookups lanes leave it in memory, and a change is lost; pays for walks of many numbers; jackknife.h is an example
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
 //       the harness fills exact_depth, knots, distance_at_depth, shares
 //

@@ -65,7 +65,7 @@ struct EstimatorTraits {
 
   static constexpr bool kCheck = requires(const E& e, const MatterBounds& medium) { e.check(medium); };
   static constexpr bool kCompletes = requires(const E& e, const RayData& ray) {
-    { e.completes(ray, std::uint32_t{1}) } -> std::convertible_to<bool>;
+    { e.completes(ray, std::uint32_t{1}) } -> std::same_as<bool>;
   };
   static constexpr bool kComponent = requires(const E& e, const Walk& walk) {
     { e.component(walk) } -> std::convertible_to<int>;
@@ -185,7 +185,7 @@ consteval bool expect_estimator() {
         },
         "a tracker needs: Value result(const Walk&, const RayData&) const");
     NULLMARK_EXPECT_SIGNATURE(check, Traits::kCheck, "void check(const MatterBounds& medium) const");
-    NULLMARK_EXPECT_SIGNATURE(completes, Traits::kCompletes, "bool completes(const RayData&, std::uint32_t lookups) const");
+    NULLMARK_EXPECT_SIGNATURE(completes, Traits::kCompletes, "bool completes(const auto& ray, std::uint32_t lookups) const");
     NULLMARK_EXPECT_SIGNATURE(component, Traits::kComponent, "int component(const Walk&) const");
     NULLMARK_EXPECT_SIGNATURE(count_law, Traits::kCountLaw,
                               "CountLaw count_law(const RayData&, const RayProfile&, int channel) const");

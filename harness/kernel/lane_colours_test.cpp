@@ -32,7 +32,7 @@ TEST(LaneColours, EveryTrackerInLanesHasTheSamplesOfThePlainLoop) {
     expect_plain_samples({entry.name, {}, {}, {}}, kThree);
     expect_plain_samples({entry.name, {}, {}, {}}, kFour);
   }
-  EXPECT_EQ(trackers, 23);
+  EXPECT_GE(trackers, 23);
 }
 
 TEST(LaneColours, ParametersChangeNothingOfThat) {

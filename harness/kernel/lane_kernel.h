@@ -72,7 +72,9 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
   static constexpr std::size_t kNumbers = sizeof(Walks) / sizeof(Pack);
   /// From this number of the walk on only lookups that complete something change it.
   static constexpr std::size_t kComplete = [] {
-    if constexpr (Traits::kCompletes) {
+    constexpr bool has = requires(typename E::Walk walk) { walk.complete; };
+    static_assert(has || !Traits::kCompletes, "with `completes`, Walk has a last member `complete`");
+    if constexpr (has && Traits::kCompletes) {
       static_assert(offsetof(typename E::Walk, complete) + sizeof(E::Walk::complete) == sizeof(typename E::Walk),
                     "with `completes`, the last member of Walk is `complete`");
       return kStream - sizeof(E::Walk::complete) / sizeof(Pack);
