@@ -98,7 +98,7 @@ namespace nullmark {
 //       result alone
 //   bool completes(const auto& ray, std::uint32_t lookups) const
 //       with kLanes: whether the consume that sees at.lookups() == lookups changes `complete`, the last member of Walk.  At other
-//       lookups lanes leave it in memory, and a change is lost; pays for walks of many numbers; jackknife.h is an example
+//       lookups lanes leave it in memory and lose a change.  This pays where walks hold many numbers, as in jackknife.h
 //   static constexpr bool kNeedsOpticalDepth, kNeedsKnots, kNeedsInversion, kNeedsShares
 //       the harness fills exact_depth, knots, distance_at_depth, shares
 //

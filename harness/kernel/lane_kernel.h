@@ -289,6 +289,7 @@ class LaneKernel final : public BlockKernel<Estimator, OfChannels<C>> {
         if (moves[axis]) (Pack(origin[axis]) + t * Pack(direction[axis])).store(&state.points[axis][k]);
     }
 
+    /// Begins what the estimator keeps of each sample.
     [[gnu::noinline]] void begin_kept(std::size_t count) {
       for (std::size_t i = 0; i < count; ++i) kernel.one().begin(state.kept[i], state.ray);
     }
